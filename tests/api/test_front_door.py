@@ -259,11 +259,15 @@ def test_the_other_explanations_of_a_tie_have_numbers(found):
     assert sorted(rival["effects"] for rival in answer["rivals"]) == sorted(answer["explanations"][1:]) != []
     for rival in found.rivals:
         assert f"or {' and '.join(rival.names)}:" in text
+        said = text.split(f"or {' and '.join(rival.names)}:")[1].split("\nor ")[0].split("cannot be told apart")[0]
         for name, numbers in rival.numbers.items():
             assert name in rival.names
+            own = answer["parameters"].get(name, {})
+            same = bool(own) and all(own[key]["low"] <= n["value"] <= own[key]["high"] for key, n in numbers.items())
+            assert (f"  {name}: as above" in said) is same
             for parameter, number in numbers.items():
                 assert number["low"] < number["value"] < number["high"]
-                assert f"    {parameter} = {number['value']:.5g}" in text
+                assert (f"    {parameter} = {number['value']:.5g}" in said) is not same
 
 
 def test_what_is_added_lowers_the_error_step_by_step(log):

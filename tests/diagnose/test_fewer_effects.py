@@ -14,7 +14,7 @@ from bns.diagnose.diagnosis import Diagnosis, diagnose
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.parameters import FreeParameter
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.report.text import _with_interval, diagnosis_text, enumerated
+from bns.diagnose.report.text import _effects_but, _with_interval, diagnosis_text, enumerated
 from bns.diagnose.residuals.outliers import Outlier
 from bns.diagnose.residuals.unexplained import Unexplained
 from bns.diagnose.select import result
@@ -206,6 +206,20 @@ def test_a_number_without_an_interval_says_why():
     said = _with_interval("force-limit", "turn_ratio", number)
     assert said.endswith("= 50 (no interval: one trial only, at a bound, or no small change changes the loss)")
     assert _with_interval("motor-lag", "tau_s", number | {"low": 40.0, "unit": "s"}).endswith("= 50 s (95 %: 40 to 50)")
+
+
+@pytest.mark.parametrize(
+    ("above", "value", "again"),
+    [({"low": 1.0, "high": 1.2}, 1.2, False), ({"low": 1.0, "high": 1.2}, 1.21, True), ({"low": None, "high": None}, 1.1, True)],
+)
+def test_of_another_explanation_only_what_differs_is_written(above, value, again):
+    number = {"value": value, "low": value - 0.1, "high": value + 0.1, "unit": "1"}
+    known = {name: effect_named(name) for name in ("wheelbase", "speed-gain")}
+    other = {"wheelbase": {"factor": number}, "speed-gain": {"gain": number}}
+    said = list(_effects_but({"wheelbase": {"factor": above}}, other, known))
+    assert ("  wheelbase: as above" in said) is not again
+    assert any(line.startswith("    factor = ") for line in said) is again
+    assert any(line.startswith("    gain = ") for line in said)  # it is not in the explanation above
 
 
 def test_a_limit_that_is_found_does_something_whatever_its_ratio():

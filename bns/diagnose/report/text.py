@@ -74,7 +74,7 @@ def _diagnosis(d: Diagnosis, rivals: Sequence[Rival], command: Mapping[str, str]
         yield from _behaviour(d)
         for rival in rivals:
             yield f"or {' and '.join(rival.names)}:"
-            yield from _effects(rival.numbers, known)
+            yield from _effects_but(d.numbers, rival.numbers, known)
         for group in ties_of(d.selection):
             yield "cannot be told apart: " + ", ".join(group)
         yield from _errors(d.errors_with_terms or d.errors)
@@ -113,6 +113,24 @@ def _effects(values: Mapping[str, Mapping[str, Mapping[str, Any]]], known: Mappi
         yield from (f"    {_number(key, n)}" for key, n in shown.items())
         if name in known:
             yield f"    {known[name].equation}"
+
+
+def _effects_but(
+    above: Mapping[str, Mapping[str, Mapping[str, Any]]],
+    values: Mapping[str, Mapping[str, Mapping[str, Any]]],
+    known: Mapping[str, Effect],
+) -> Iterator[str]:
+    """As `_effects`; an effect whose numbers all lie in their intervals ``above`` is not written again."""
+    for name, numbers in values.items():
+        if name in above and all(_within(number, above[name].get(key, {})) for key, number in numbers.items()):
+            yield f"  {name}: as above"
+        else:
+            yield from _effects({name: numbers}, known)
+
+
+def _within(number: Mapping[str, Any], interval: Mapping[str, Any]) -> bool:
+    low, value, high = interval.get("low"), number.get("value"), interval.get("high")
+    return low is not None and value is not None and high is not None and bool(low <= value <= high)
 
 
 def _behaviour(d: Diagnosis) -> Iterator[str]:
