@@ -161,6 +161,26 @@ def test_a_diagnosis_whose_search_lost_an_effect_keeps_its_tie(late, monkeypatch
     assert {*found.effects, *found.selection.competing_models[0]} == {"clock-offset", "command-delay"}
 
 
+@pytest.mark.parametrize("terms", [(), ("a term",)])
+def test_beside_terms_too_it_is_asked_what_competes(late, monkeypatch, terms):
+    """A stand-in for the judgement; the answer is what the search is asked, and ends there."""
+
+    class AskedError(Exception):
+        pass
+
+    def asked(_search, _selection, alike):
+        raise AskedError(alike)
+
+    plain = outcome.outcome_of
+    monkeypatch.setattr(
+        "bns.diagnose.diagnosis.outcome_of", lambda *given: replace(plain(*given), withdrawn=("speed-gain",), terms=terms)
+    )
+    monkeypatch.setattr(StepwiseSelection, "competing", asked)
+    with pytest.raises(AskedError) as ended:
+        diagnose(late, NOMINAL)
+    assert ended.value.args == (bool(terms),)
+
+
 @pytest.mark.parametrize(("given", "fewest"), [(NOMINAL, 1), (NOMINAL.with_effect("wheelbase", factor=1.0), 0)])
 def test_beside_effects_of_the_model_one_alone_is_judged_as_well(late, monkeypatch, given, fewest):
     asked = []

@@ -147,6 +147,29 @@ def test_what_terms_describe_wholly_counts_only_if_it_matters(monkeypatch, matte
         assert next(said).startswith("What is left is certain but slight: slower for two seconds.")
 
 
+@pytest.mark.parametrize("better", [True, False])
+def test_what_is_below_the_noise_counts_where_a_curve_does_better_than_the_effects_that_imitate_it(monkeypatch, better):
+    """With mocked parts: two effects leave something that is slight; a term that has none of them beside it leaves nothing."""
+    searched = selected("wheelbase", "wheel-mismatch")
+    found = Established((), ("a term",), searched.problem, "fit with the term")
+    left = replace(NOTHING, residual_dependence=("something",))
+    asked = []
+    monkeypatch.setattr(outcome, "_established", lambda *_: found)
+    monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: "errors")
+    monkeypatch.setattr(outcome, "_believable", lambda found, *_: found)
+    monkeypatch.setattr(outcome, "_matters", lambda _: True)
+    monkeypatch.setattr(outcome, "_within_noise", lambda _: True)
+    monkeypatch.setattr(outcome, "_does_better_than_more", lambda *given: asked.append(given[2]) or better)
+    monkeypatch.setattr(outcome, "residual_dependence", lambda *_: [])
+    monkeypatch.setattr(outcome, "unexplained", lambda _, fit, __: NOTHING if fit == found.fit else left)
+    monkeypatch.setattr(outcome, "best_formula", lambda *_: None)
+    ended = outcome.outcome_of(searched, predictor(), NOMINAL, lambda _: None)
+    assert asked == [("wheelbase", "wheel-mismatch")]
+    assert (ended.selection.accepted, ended.terms) == (((), ("a term",)) if better else (searched.accepted, ()))
+    assert ended.slight == (() if better else ("a term",))
+    assert (ended.rest == NOTHING) is not better
+
+
 def test_beside_terms_an_effect_at_its_bound_is_left_out_and_the_terms_are_searched_again(monkeypatch):
     """Terms and a wheelbase that run away from each other serve together, and neither says anything."""
     searched = selected("wheelbase", "wheel-mismatch")
