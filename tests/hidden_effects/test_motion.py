@@ -29,7 +29,15 @@ from tests.hidden_effects.listed_motors import Backlash
 from tests.hidden_effects.luck import luck
 from tests.hidden_effects.motion import mean_commands, move
 from tests.hidden_effects.unlisted import Kicks, Swing
-from tests.hidden_effects.unlisted_motors import LateStart, LeftOvershoot, LooseWheel, SpeedLag, Stalls, WeakSupply
+from tests.hidden_effects.unlisted_motors import (
+    LateStart,
+    LeftOvershoot,
+    LooseWheel,
+    LostPulses,
+    SpeedLag,
+    Stalls,
+    WeakSupply,
+)
 
 BASE_M = 0.1
 
@@ -252,3 +260,8 @@ def test_kicks_come_as_often_as_is_said():
     kicks = round(told / 0.01)
     assert told == pytest.approx(0.01 * kicks, abs=1e-6)
     assert 0 < abs(kicks) < 40
+
+
+def test_a_wheel_whose_counter_misses_pulses_above_a_speed_is_too_fast_there_in_both_directions():
+    said = LostPulses(0.1, 0.5).command(np.array([[[0.05, -0.1], [0.2, -0.15]]]))
+    np.testing.assert_allclose(said, [[[0.05, -0.1], [0.3, -0.2]]])

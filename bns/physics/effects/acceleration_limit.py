@@ -40,5 +40,6 @@ EFFECT = Effect(
     measurement="log the wheels' own speeds (encoders) at a high rate while a command changes",
     apply=apply,
     needs="track",
+    # apart from what is plausible: a limit above 20 m/s^2 is reached from 20, and what a log of a vehicle ends in depends on them
     starts=tuple((float(most),) for most in np.geomspace(0.02, 20.0, 30)),
 )
