@@ -18,6 +18,7 @@ from bns.trial.driver import TrialDriver
 from bns.trial.folder import (
     JOURNAL,
     MEASUREMENTS,
+    check_not_cut,
     forget_unless,
     locked,
     measured,
@@ -145,6 +146,7 @@ def _driven_before(journal: Path, trials: list[np.ndarray], resume: bool) -> int
         raise HardwareError(
             f"there is an experiment in {journal.parent} already; resume it with --resume, move it away or rename the file."
         )
+    check_not_cut(journal)
     past = past_evaluations(journal)
     same = len(past) <= len(trials) and all(
         one.picked.shape == asked.shape and np.allclose(one.picked, asked, rtol=1e-5)

@@ -70,7 +70,29 @@ class TrialFolder:
             )
         if resume and not self.journal.exists():
             raise HardwareError(f"there is nothing to resume: no journal in {self.path}. Start without --resume.")
-        return past_evaluations(self.journal) if resume else []
+        if not resume:
+            return []
+        check_not_cut(self.journal)
+        return past_evaluations(self.journal)
+
+
+def check_not_cut(journal: Path) -> None:
+    """HardwareError if the table of measurements in its folder has more rows than a journal holds.
+
+    Numbers and checksums of lines do not show that lines at the end are lost; and a trial that goes on writes over the table.
+    """
+    table = journal.with_name(MEASUREMENTS)
+    if not table.exists():
+        return
+    try:
+        kept = table.read_bytes().count(b"\n") - 1
+    except OSError as error:
+        raise HardwareError(f"cannot read {table}: {error}. It is compared with the journal; make it readable.") from error
+    if kept > (held := len(measured(journal))):
+        raise HardwareError(
+            f"{journal} has lost its last lines: it holds {held} rows of measurements, {table.name} in the same folder {kept}. "
+            "Restore the journal from a copy, or move the folder away and start from the beginning."
+        )
 
 
 def spec_of(journal: Path) -> RunSpec:

@@ -1,5 +1,6 @@
 """Journals that are torn or damaged give every whole run they hold."""
 
+import os
 import shutil
 import warnings
 from dataclasses import replace
@@ -185,9 +186,21 @@ def test_empty_journal_is_removed(tmp_path):
     path = tmp_path / "journal" / f"s--j{'1' * 32}.journal"
     path.parent.mkdir(parents=True)
     path.touch()
-    with warnings.catch_warnings(), Writer(tmp_path, "s") as writer:
+    with warnings.catch_warnings(action="error"), Writer(tmp_path, "s") as writer:
         assert writer.recovered == 0
     assert not path.exists()
+
+
+def test_emptied_journal_is_reported(left):
+    results, path, *_ = left
+    path.write_bytes(b"")
+    with warnings.catch_warnings(action="error"):
+        assert not finished(results, "s")  # it may be under way
+    os.utime(path, (1, 1))
+    with pytest.warns(StoreWarning, match=r"journal is empty: .*was emptied; its 0 whole runs are read"):
+        assert not finished(results, "s")
+    with pytest.warns(StoreWarning, match=r"emptied; 0 whole runs of it are kept\. Run the sweep again"), Writer(results, "s"):
+        assert not path.exists()
 
 
 def test_damage_is_counted_to_the_byte(left):

@@ -1,6 +1,7 @@
 """What is written comes back: values, types, order, every run once."""
 
 import pickle
+from dataclasses import replace
 from datetime import UTC, datetime
 from types import SimpleNamespace
 
@@ -90,6 +91,10 @@ def test_columns_and_conditions(tmp_path):
     named = load(tmp_path, where={"mutation_rate": [0.2, 0.4], "sweep": "s", "evaluation": 1})
     assert named["run_id"].tolist() == load(tmp_path, columns=["run_id"], where=condition)["run_id"].tolist()
     assert load(tmp_path, where={"evaluation": []}).empty
+    nowhere = records(1, root_seed=7)[0]
+    write(tmp_path, [replace(nowhere, run=nowhere.run | {"world_digest": ""})])
+    assert len(load(tmp_path, "runs", where={"world_digest": ""})) == 1
+    assert load(tmp_path, "runs", where={"world_digest": []}).empty
     assert load(tmp_path, where={"task": "it's"}).empty
 
 

@@ -167,4 +167,4 @@ class KheperaIII:
 def check_battery(volts: float) -> None:
     """HardwareError if the battery is too low to begin with."""
     if volts < _FLAT_V:
-        raise HardwareError(f"the battery is at {volts:.1f} V; charge it above {_FLAT_V:g} V first.")
+        raise HardwareError(f"the battery is at {volts:.1f} V; charge it to {_FLAT_V:g} V or more first.")

@@ -11,6 +11,7 @@ import json
 import os
 import re
 import struct
+import time
 import uuid
 import zlib
 from dataclasses import dataclass
@@ -28,6 +29,8 @@ MAGIC = b"\x89BNSrun\n"
 _HEAD = struct.Struct("<8sQI")
 _CHECK = struct.Struct("<I")
 _HEAD_SIZE = _HEAD.size + _CHECK.size
+_YOUNG_S = 10
+"""Age at which an empty journal is no longer one that is just being written; a first frame is written within a second."""
 _FILE_NAME = re.compile(r"(?P<sweep>[A-Za-z][A-Za-z0-9_-]*)--(?P<id>j[0-9a-f]{32})\.journal")
 
 
@@ -90,6 +93,19 @@ def read_journal(file: JournalFile) -> Scan:
             return Scan(b"", [], 0, 0)
         raise
     return scan(data, file)
+
+
+def fault_of(file: JournalFile, found: Scan) -> str | None:
+    """What is wrong with a journal, in words; None if nothing is.
+
+    A writer makes a journal when its first run is over, so that one without a byte was emptied, or its first run never
+    reached the disk. A young one is left alone: its writer may be between the two.
+    """
+    if found.damaged:
+        return f"{file.path} is damaged ({found.damaged} bytes)"
+    if not found.data and _age_s(file.path) > _YOUNG_S:
+        return f"{file.path} is empty: its first run did not reach the disk, or the file was emptied"
+    return None
 
 
 def scan(data: bytes, file: JournalFile) -> Scan:
@@ -196,6 +212,13 @@ def _stream(table: pa.Table) -> bytes:
     with pa.ipc.new_stream(sink, table.schema) as writer:
         writer.write_table(table)
     return bytes(sink.getvalue())
+
+
+def _age_s(path: Path) -> float:
+    try:
+        return time.time() - path.stat().st_mtime
+    except OSError:
+        return 0.0
 
 
 def _length_at(data: bytes, at: int) -> int | None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from bns.errors import StoreError
 from bns.store.disk.files import StoreWarning, what_is_there
-from bns.store.disk.journal import Frame, JournalFile, best_frames, journals, read_journal
+from bns.store.disk.journal import Frame, JournalFile, best_frames, fault_of, journals, read_journal
 from bns.store.disk.parquet import READ_FAULTS, read_part
 from bns.store.disk.parts import Part, Unreadable, check_version, find_parts, list_files
 from bns.store.disk.whole import exchanged, lacking, without
@@ -87,9 +87,9 @@ def _settled_parts(results: Path, sweep: str | None) -> tuple[dict[str, list[Par
 
 def _frames(file: JournalFile) -> list[Frame]:
     found = read_journal(file)
-    if found.damaged:
+    if fault := fault_of(file, found):
         warnings.warn(
-            f"{file.path} is damaged ({found.damaged} bytes); its {len(found.frames)} whole runs are read.",
+            f"{fault}; its {len(found.frames)} whole runs are read.",
             StoreWarning,
             stacklevel=4,
         )

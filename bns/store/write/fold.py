@@ -10,7 +10,7 @@ import pyarrow as pa
 
 from bns.store.disk.digest import digest_in
 from bns.store.disk.files import STAGING, StoreWarning, on_the_way, partition, publish, remove, set_aside
-from bns.store.disk.journal import Frame, JournalFile, Scan, best_frames, read_journal
+from bns.store.disk.journal import Frame, JournalFile, Scan, best_frames, fault_of, read_journal
 from bns.store.disk.parquet import part_bytes
 from bns.store.schema import RECORDED
 
@@ -22,8 +22,8 @@ def fold_journal(results: Path, file: JournalFile) -> int:
     A journal with damage is copied to ``set-aside/`` first, with a StoreWarning.
     """
     found = read_journal(file)
-    if found.damaged:
-        _report_damage(results, file, found)
+    if fault := fault_of(file, found):
+        _report_damage(results, file, found, fault)
     frames = best_frames(found.frames)
     for task in sorted({frame.task for frame in frames}):
         publish_part(results, file.sweep, task, f"part-{file.id}-0", [f for f in frames if f.task == task])
@@ -72,11 +72,10 @@ def clear_staging(results: Path, sweep: str) -> None:
         remove(path)
 
 
-def _report_damage(results: Path, file: JournalFile, found: Scan) -> None:
-    copy = set_aside(results, file.path, found.data)
+def _report_damage(results: Path, file: JournalFile, found: Scan, fault: str) -> None:
+    copy = f", a copy is in {set_aside(results, file.path, found.data)}" if found.data else ""
     warnings.warn(
-        f"{file.path} is damaged ({found.damaged} bytes); {len(found.frames)} whole runs of it are "
-        f"kept, a copy is in {copy}. Run the sweep again: it repeats what is missing.",
+        f"{fault}; {len(found.frames)} whole runs of it are kept{copy}. Run the sweep again: it repeats what is missing.",
         StoreWarning,
         stacklevel=3,
     )

@@ -38,6 +38,13 @@ def test_given_commands_are_gone_on_with(tmp_path, capsys):
     assert 1 <= pd.read_csv(table)["trial"].max() < 4
     assert call(*asked, "--resume") == 0
     assert pd.read_csv(table)["trial"].unique().tolist() == [1, 2, 3, 4]
+    journal = table.with_name("journal.jsonl")
+    whole = journal.read_bytes()
+    for lines in (0, 2):
+        journal.write_bytes(b"".join(whole.splitlines(keepends=True)[:lines]))
+        assert call(*asked, "--resume") == 2
+        assert "has lost its last lines: it holds 0 rows" in capsys.readouterr().err
+    journal.write_bytes(whole)
     file.write_text("trial,left_m_s,right_m_s,duration_s\n1,0.1,0.1,3.0\n")
     assert call(*asked, "--resume") == 2
     assert "drove other commands than the file holds now" in capsys.readouterr().err

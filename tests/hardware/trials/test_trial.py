@@ -87,10 +87,15 @@ def test_a_pause_is_gone_on_with_and_nothing_is_lost(tmp_path, capsys):
     assert evaluated(tmp_path, "trials-emulated")["evaluation"].tolist() == [1, 2, 3, 4]
 
 
-def test_a_resumed_trial_is_the_trial_that_a_replay_gives(tmp_path):
+def test_a_resumed_trial_is_the_trial_that_a_replay_gives(tmp_path, capsys):
     plan = faults(tmp_path, {"kind": "hang-up", "at_s": 12, "for_s": 2})
     asked = [*TRIAL, "--evaluations", 3, "--results", tmp_path, "--most-rounds", 3]
     assert call(*asked, *plan) == 3
+    kept = journal_of(tmp_path).read_bytes()
+    journal_of(tmp_path).write_bytes(b"")
+    assert call(*asked, "--resume") == 2
+    assert "has lost its last lines: it holds 0 rows" in capsys.readouterr().err
+    journal_of(tmp_path).write_bytes(kept)
     assert call(*asked, "--resume") == 0
     assert call("trial", "--replay", journal_of(tmp_path), "--results", tmp_path) == 0
     first, again = evaluated(tmp_path, "trials-emulated"), evaluated(tmp_path, "trials-replayed")

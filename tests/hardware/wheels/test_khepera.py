@@ -207,7 +207,7 @@ def test_ports_that_cannot_be_used(tmp_path, clock, bench):
 def test_a_flat_battery_is_refused():
     check_battery(7.4)
     check_battery(6.0)
-    with pytest.raises(HardwareError, match=r"battery is at 5.1 V; charge it above 6 V"):
+    with pytest.raises(HardwareError, match=r"battery is at 5.1 V; charge it to 6 V or more"):
         check_battery(5.1)
 
 

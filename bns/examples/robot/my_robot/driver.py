@@ -123,7 +123,7 @@ def open_platform(rig, clock, journal, stopping):
 
 def _check_battery(volts):
     if volts < FLAT_V:
-        raise HardwareError(f"the battery is at {volts:.1f} V; charge it above {FLAT_V:g} V first.")
+        raise HardwareError(f"the battery is at {volts:.1f} V; charge it to {FLAT_V:g} V or more first.")
 
 
 def emulate(rig, folder, clock, plan, seed):
