@@ -90,12 +90,15 @@ def pooled(rows: pd.DataFrame, curve: Sequence[str]) -> pd.DataFrame:
     keys = [*curve, "evaluation"]
     totals = rows.groupby(keys, as_index=False)[["runs", "successes"]].sum()
     low, high = wilson(totals.successes, totals.runs)
+    place, seed = (rows.groupby(names).ngroup().to_numpy() for names in (keys, ["root_seed", "seed"]))
+    numbers = rows[["runs", "successes"]].to_numpy(float)
     for _, own in totals.groupby(list(curve)):
         at = own.index.to_numpy()
-        seeds = rows.merge(own[keys], on=keys).pivot_table(
-            index=["root_seed", "seed"], columns="evaluation", values=["runs", "successes"], aggfunc="sum", fill_value=0
-        )
-        ends = bootstrap(seeds["successes"].to_numpy(float), seeds["runs"].to_numpy(float))
+        mine = np.isin(place, at)
+        seeds, nth = np.unique(seed[mine], return_inverse=True)
+        sums = np.zeros((len(seeds), len(at), 2))
+        np.add.at(sums, (nth, np.searchsorted(at, place[mine])), numbers[mine])
+        ends = bootstrap(sums[..., 1], sums[..., 0])
         low[at], high[at] = np.fmin(low[at], ends[0]), np.fmax(high[at], ends[1])
     return totals.assign(low=low, high=high)
 
