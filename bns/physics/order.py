@@ -6,6 +6,7 @@ OTHERS, DECOYS, FORMULAS = "others", "decoys", "formulas"
 """Places for effects that are not in the catalogue: those of users, decoys, formulas."""
 
 ORDER = (
+    "command-timeout",  # counts from changes of the command itself
     "command-quantisation",
     "command-truncation",
     "command-rate",
@@ -20,6 +21,7 @@ ORDER = (
     "friction-warm-up",
     "stribeck",
     "dead-band",
+    "breakaway",
     "speed-limit",
     "speed-limit-mismatch",
     "speed-scaling",
@@ -53,6 +55,7 @@ ORDER = (
     "floor-patch",
     "wheel-patch",
     "uneven-patch",
+    "carpet-drift",
     "slope-load",
     "tether-load",
     DECOYS,

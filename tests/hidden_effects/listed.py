@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 from tests.hidden_effects.cause import Body, Cause, Moment
 from tests.hidden_effects.listed_braking import BrakingLag, BrakingLimit, BrakingRamp, LagMismatch
 from tests.hidden_effects.listed_floor import (
+    CarpetDrift,
     CasterDrag,
     CasterSwing,
     FloorPatch,
@@ -31,8 +32,10 @@ from tests.hidden_effects.listed_loads import (
 )
 from tests.hidden_effects.listed_motors import (
     Backlash,
+    Breakaway,
     CommandQuantisation,
     CommandRate,
+    CommandTimeout,
     CommandTruncation,
     DeadZoneMismatch,
     Heating,
@@ -353,6 +356,9 @@ LISTED: dict[str, type[Cause]] = {
     "wheel-mismatch": WheelMismatch,
     "speed-limit": SpeedLimit,
     "speed-scaling": SpeedScaling,
+    "breakaway": Breakaway,
+    "carpet-drift": CarpetDrift,
+    "command-timeout": CommandTimeout,
     "reversal-pause": ReversalPause,
     "battery-sag": BatterySag,
     "supply-sag": SupplySag,

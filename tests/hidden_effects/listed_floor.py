@@ -32,6 +32,18 @@ class FloorPatch(Cause):
 
 
 @dataclass
+class CarpetDrift(Cause):
+    """A carpet that moves like a slow belt while the robot drives, forwards or backwards, and stands while it turns."""
+
+    x_share: float
+    y_share: float
+
+    def body(self, body: Body, moment: Moment) -> Body:
+        driven = np.sqrt(body.forward**2)
+        return body._replace(east=body.east + driven * self.x_share, north=body.north + driven * self.y_share)
+
+
+@dataclass
 class WheelPatch(FloorPatch):
     """The same, slowing a wheel where it is itself; a complex number points from the robot's centre to its left wheel."""
 

@@ -73,6 +73,45 @@ class ReversalPause(Cause):
 
 
 @dataclass
+class Breakaway(Cause):
+    """Each wheel has a switch: on at one command, off below a lower one."""
+
+    threshold_m_s: float
+    stop_ratio: float
+
+    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        size = np.abs(wheels)
+        on, off = size >= self.threshold_m_s, size < self.threshold_m_s * self.stop_ratio
+        said = np.where(on, 1, np.where(off, -1, 0))
+        state = np.full_like(said[:, 0], -1)
+        out = np.zeros_like(wheels)
+        for i in range(wheels.shape[1]):
+            state = np.where(said[:, i] != 0, said[:, i], state)
+            out[:, i] = wheels[:, i] * (state > 0)
+        return out
+
+
+@dataclass
+class CommandTimeout(Cause):
+    """A countdown that every new command of either wheel sets back; the wheels turn while it runs: looked at in small steps."""
+
+    timeout_s: float
+
+    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        out, small_s = np.empty_like(wheels), moment.step_s / FINE
+        left_s = np.full(len(wheels), self.timeout_s)
+        for i in range(wheels.shape[1]):
+            if i:
+                left_s[(np.abs(wheels[:, i] - wheels[:, i - 1]) > 1e-9).any(axis=1)] = self.timeout_s  # not by rounding
+            runs = np.zeros(len(wheels))
+            for _ in range(FINE):
+                runs += (left_s > small_s / 2) / FINE
+                left_s -= small_s
+            out[:, i] = wheels[:, i] * runs[:, None]
+        return out
+
+
+@dataclass
 class ReverseGain(Cause):
     """Half the sum of a speed and its size is what is forwards of it, the rest is backwards."""
 

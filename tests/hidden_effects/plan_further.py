@@ -29,6 +29,9 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
     "warm-up": ({"loss": 0.08, "time_s": 4.0}, {"loss": 0.25, "time_s": 3.0}),
     "stribeck": ({"width_m_s": 0.02, "fade_m_s": 0.04}, {"width_m_s": 0.04, "fade_m_s": 0.05}),
     "dead-band": ({"threshold_m_s": 0.03}, {"threshold_m_s": 0.045}),
+    "breakaway": ({"threshold_m_s": 0.045, "stop_ratio": 0.5}, {"threshold_m_s": 0.06, "stop_ratio": 0.4}),
+    "carpet-drift": ({"x_share": 0.03, "y_share": -0.02}, {"x_share": -0.05, "y_share": 0.08}),
+    "command-timeout": ({"timeout_s": 1.0}, {"timeout_s": 0.6}),
     "turn-slip-quadratic": ({"slip_s2": 0.03}, {"slip_s2": 0.07}),
     "floor-patch": (
         {"x_m": 0.8, "y_m": 0.5, "radius_m": 0.35, "loss": 0.12},
@@ -109,6 +112,7 @@ ALIKE = {
 TURNING = {
     "backlash",
     "braking-lag",
+    "breakaway",
     "caster-drag",
     "caster-swing",
     "dead-band",

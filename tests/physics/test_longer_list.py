@@ -129,6 +129,8 @@ def test_the_judges_second_equations_agree(name):
         values = values | {"x_m": 0.9, "y_m": 0.45, "radius_m": 0.08, "loss": 0.3}
     if name == "dead-band":
         values = {"threshold_m_s": 0.095}
+    if name == "breakaway":
+        values = {"threshold_m_s": 0.095, "stop_ratio": 0.6}
     agrees_with_the_judge(name, values)
 
 
@@ -272,6 +274,35 @@ def test_a_wheel_stands_before_it_turns_the_other_way_counted_from_when_it_stopp
         assert simulate(model, speeds, speeds, last)[0, -1, 0] == pytest.approx(0.1 * stood_s)
     again = simulate(model, [[0.1, 0.0, 0.1]], [[0.1, 0.0, 0.1]], [[1.0, 0.1, 1.0]])[0]
     assert again[-1, 0] == pytest.approx(0.2)
+
+
+def test_a_wheel_starts_at_a_higher_command_than_it_stops_at():
+    model = IDEAL.with_effect("breakaway", threshold_m_s=0.08, stop_ratio=0.5)
+    for speeds, driven in (
+        ((0.07, 0.08, 0.07), 0.15),  # at rest until it is told 0.08, and then on
+        ((0.08, 0.04, 0.03, 0.07), 0.12),  # on at half of that, and off below
+        ((0.08, -0.05, 0.0, -0.05), 0.03),  # a reversal is no stop, and a stop is one
+    ):
+        lasts = [1.0] * len(speeds)
+        assert simulate(model, [speeds], [speeds], [lasts])[0, -1, 0] == pytest.approx(driven)
+
+
+def test_a_robot_stops_when_no_new_command_comes():
+    model = IDEAL.with_effect("command-timeout", timeout_s=0.5)
+    speeds, lasts = [0.1, 0.1, 0.2, 0.0, 0.1], [0.3, 0.4, 1.0, 1.0, 0.2]
+    straight = simulate(model, [speeds], [speeds], [lasts])[0, -1, 0]
+    assert straight == pytest.approx(0.1 * 0.5 + 0.2 * 0.5 + 0.1 * 0.2)  # the same command again is no new one
+    curve = simulate(model, [[0.1, 0.1]], [[0.1, 0.2]], [[2.0, 2.0]])[0, -1, 2]
+    assert curve == pytest.approx(0.5 * 0.1 / B)  # a new command of one wheel sets both going
+
+
+def test_a_carpet_carries_the_robot_by_a_share_of_the_distance():
+    """At any speed, forwards and backwards; not in a turn on the spot."""
+    model = IDEAL.with_effect("carpet-drift", x_share=0.1, y_share=-0.05)
+    for speed in (0.1, 0.3, -0.2):
+        end = simulate(model, [[speed]], [[speed]], [[3.0]], start=np.array([[0.0, 0.0, np.pi / 2]]))[0, -1]
+        assert end[:2] == pytest.approx([0.1 * abs(speed) * 3, speed * 3 - 0.05 * abs(speed) * 3])
+    assert simulate(model, [[0.1]], [[-0.1]], [[3.0]])[0, -1, :2] == pytest.approx([0.0, 0.0])
 
 
 def test_a_cold_robot_loses_more_to_friction_than_one_that_has_driven():

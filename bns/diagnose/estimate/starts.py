@@ -73,7 +73,8 @@ def fit_with(problem: Problem, base: Fit, effect: Effect, known: Model | None = 
 def fit_extended(problem: Problem, base: Fit, effect: Effect, given: bool = False) -> Fit:
     """The fit with an effect in the place of the one of ``base`` that it ``extends``, from that one's numbers.
 
-    Or in the place of one that extends the same effect in another way. ``given``: that one comes back if this goes.
+    Or in the place of one that extends the same effect in another way. ``given``: that one comes back if this goes. Of an effect
+    with a jagged loss its own starts are tried, too: its best place may be far from that of the simpler one.
     """
     alike = {effect.extends, *(a.effect.name for a in base.model.effects if a.effect.extends == effect.extends)}
     gone = next(a.effect.name for a in base.model.effects if a.effect.name in alike)
@@ -83,10 +84,11 @@ def fit_extended(problem: Problem, base: Fit, effect: Effect, given: bool = Fals
     varied = {p.name for p in own if not p.is_multiple} or {p.name for p in own}  # a multiple of nothing does nothing
     neutral = {name: [value] for name, value in {**effect.neutral, **known}.items()}
     starts = product(*(neutral[p.name] + (list(_grid(p)) if p.name in varied else []) for p in effect.parameters))
+    jagged = any(p.jagged for p in own)
     bare = base.model if given else base.model.without(gone)
-    models = [bare.with_active(effect, values) for values in starts]
+    models = [bare.with_active(effect, values) for values in (*starts, *(effect.starts if jagged else ()))]
     fit = problem.fit(min(models, key=problem.loss))
-    return _from_lower_places(problem, fit) if any(p.jagged for p in own) else fit
+    return _from_lower_places(problem, fit) if jagged else fit
 
 
 def _from_lower_places(problem: Problem, fit: Fit) -> Fit:

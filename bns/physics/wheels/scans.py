@@ -72,6 +72,39 @@ def paused(target: Array, step_s: Array, pause_s: float) -> Array:
 
 
 @exact
+def broken_away(target: Array, step_s: Array, start: float, stop: float) -> Array:
+    """The target from ``start`` on until it is below ``stop``, in size, else 0; a trial begins at rest."""
+    out = np.zeros_like(target)
+    for row in range(target.shape[0]):
+        turns = False
+        for k in range(target.shape[1]):
+            if step_s[row, k] == 0.0:
+                continue
+            turns = abs(target[row, k]) >= (stop if turns else start)
+            if turns:
+                out[row, k] = target[row, k]
+    return out
+
+
+@exact
+def timed_out(left: Array, right: Array, step_s: Array, timeout_s: float) -> tuple[Array, Array]:
+    """Mean over each step of two speeds that are 0 from ``timeout_s`` after the last change of either; exact."""
+    mean_left, mean_right = np.zeros_like(left), np.zeros_like(right)
+    for row in range(left.shape[0]):
+        before_left, before_right, since_s = 0.0, 0.0, 0.0
+        for k in range(left.shape[1]):
+            h, u, v = step_s[row, k], left[row, k], right[row, k]
+            if h == 0.0:
+                continue
+            if u != before_left or v != before_right:
+                before_left, before_right, since_s = u, v, 0.0
+            share = min(max(timeout_s - since_s, 0.0) / h, 1.0)
+            mean_left[row, k], mean_right[row, k] = share * u, share * v
+            since_s += h
+    return mean_left, mean_right
+
+
+@exact
 def second_order(target: Array, step_s: Array, tau_s: float, lead_s: float, swing_s: float) -> Array:
     """Mean over each step of w = y + lead·y', where swing²·y'' + (tau + lead)·y' + y = target and y = y' = 0 at the start; exact.
 
