@@ -53,6 +53,19 @@ def number(value, low=None, high=None, **more):
             "friction takes 10 mm/s of its speed from every wheel, 5 mm/s less when the session begins",
         ),
         ("speed-limit", {"max_m_s": number(0.42)}, "no wheel runs faster than 420 mm/s"),
+        (
+            *("marker-offset", {"forward_m": number(0.011), "left_m": number(-0.006)}),
+            "the tracked point is not the point about which the robot turns, but 11 mm ahead of it and 6 mm to its right",
+        ),
+        (
+            *("marker-offset", {"forward_m": number(-0.02, -0.021, -0.019), "left_m": number(0.0004, -0.001, 0.001)}),
+            "the tracked point is not the point about which the robot turns, but 20 mm behind it and 0.4 mm to its left",
+        ),
+        (
+            *("breakaway", {"threshold_m_s": number(0.075), "stop_ratio": number(0.47)}),
+            "a wheel at rest starts at 75 mm/s, and one that turns stops at 47 % of that",
+        ),
+        ("command-timeout", {"timeout_s": number(0.7)}, "the robot stops 700 ms after its last new command"),
     ],
 )
 def test_a_sentence_follows_the_numbers(name, numbers, said):

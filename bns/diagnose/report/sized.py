@@ -35,7 +35,10 @@ def sized_sentence(effect: Effect, numbers: Mapping[str, Mapping[str, Any]]) -> 
 
 
 def _said(p: Parameter, number: Mapping[str, Any], words: str) -> Iterator[str]:
-    """A number alone; with ``words`` ("above|below") how far it is from neutral, and to which side; nothing if that is open."""
+    """A number alone; with ``words`` ("above|below") how far it is from neutral, and to which side; nothing if that is open.
+
+    With a plus before the words a side is said even then: a place has two coordinates, and one of them may be 0.
+    """
     value, low, high = (number.get(key) for key in ("value", "low", "high"))
     if value is None or not np.isfinite(value) or number.get("per_trial") or number.get("cancels"):
         return
@@ -43,10 +46,10 @@ def _said(p: Parameter, number: Mapping[str, Any], words: str) -> Iterator[str]:
         yield _size(value, p)
         return
     open_side = low is not None and high is not None and low <= p.neutral <= high
-    if value == p.neutral or open_side:
+    if (value == p.neutral or open_side) and not words.startswith("+"):
         return
-    above, below, *only = words.split("|")
-    side = above if value > p.neutral else below
+    above, below, *only = words.removeprefix("+").split("|")
+    side = above if value >= p.neutral else below
     if only:
         yield side
     elif p.is_multiple and max(value, 1.0 / value) >= _BY_FACTOR:

@@ -34,7 +34,8 @@ EFFECT = Effect(
     residuals="Turns on the spot move the tracked point on a circle; straight commands fit.",
     lookalikes=("side-slip", "turn-slip"),
     sentence="the tracked point is not the point about which the robot turns (the midpoint of the axle in the model)",
-    sized="the tracked point is not the point about which the robot turns, but {forward_m} ahead of it and {left_m} to its left",
+    sized="the tracked point is not the point about which the robot turns, but {forward_m:+ahead of it|behind it} and "
+    "{left_m:+to its left|to its right}",
     measurement="measure the position of the marker from the midpoint of the axle with a ruler",
     or_of_robot="the robot turns about another point than the midpoint of its axle, as skid-steered robots do, and the marker is "
     "where it should be. A ruler tells which: the measured position of the marker from the midpoint of the axle is either this "
