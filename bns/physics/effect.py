@@ -131,8 +131,8 @@ class Effect:
     """What happens, as a clause after "Missing from the model:"; may be empty, like all fields below."""
     sized: str = ""
     """The sentence with fitted numbers, a format string: ``{tau_s}`` is a number with its unit, ``{gain:faster|slower}`` how far
-    it is from neutral and the word for above or below ("7 % slower"), ``{gain:faster|slower|}`` that word alone. A plus before the
-    words, ``{left_m:+to its left|to its right}``, says the side even of a number that may be neutral."""
+    it is from neutral and the word for above or below ("7 % slower"), ``{gain:faster|slower|}`` that word alone. A plus
+    before the words, ``{left_m:+to its left|to its right}``, says the side even of a number that may be neutral."""
     measurement: str = ""
     """A measurement on the bench that shows this effect alone."""
     or_of_robot: str = ""
