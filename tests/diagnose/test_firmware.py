@@ -7,7 +7,7 @@ import pytest
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.problem import problem_for
-from bns.diagnose.estimate.starts import fit_with, listed
+from bns.diagnose.estimate.starts import fit_extended, fit_with, listed
 from bns.diagnose.predict.wheels import WheelPredictor
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
@@ -29,6 +29,8 @@ def driven(trials=20, **effects):
         ("reverse-gain", {"gain": 0.9}),
         ("dead-zone-mismatch", {"width_m_s": 0.01, "left_share": 1.8}),
         ("speed-limit-mismatch", {"max_m_s": 0.12, "left_spare": 0.25}),
+        ("carpet-drift", {"x_share": 0.05, "y_share": -0.03}),
+        ("command-timeout", {"timeout_s": 0.8}),
     ],
 )
 def test_each_is_named_with_its_numbers(name, values):
@@ -59,3 +61,14 @@ def test_a_step_is_found_that_is_no_round_number(name, step_m_s):
     problem = problem_for(predictor, NOMINAL)
     found = fit_with(problem, problem.fit(NOMINAL), listed(NOMINAL, None, predictor.tracks)[name])
     assert found.values == pytest.approx([step_m_s, 1.0], rel=0.05)
+
+
+def test_a_wheel_that_starts_late_is_found_from_one_that_stops_at_the_same_command():
+    """The best single threshold, by which it is begun, lies far from both."""
+    predictor = driven(breakaway={"threshold_m_s": 0.09, "stop_ratio": 0.4})
+    effects = listed(NOMINAL, None, predictor.tracks)
+    problem = problem_for(predictor, NOMINAL)
+    alike = fit_with(problem, problem.fit(NOMINAL), effects["dead-band"])
+    assert alike.values[0] < 0.075
+    found = fit_extended(problem, alike, effects["breakaway"])
+    assert found.values == pytest.approx([0.09, 0.4], rel=0.1)
