@@ -74,17 +74,15 @@ class ReversalPause(Cause):
 
 @dataclass
 class Breakaway(Cause):
-    """Each wheel has a switch: on at one command, off below a lower one."""
+    """Each wheel has a switch, moved by its commands in turn: on from one, off below a lower one."""
 
     threshold_m_s: float
     stop_ratio: float
 
-    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+    def command(self, wheels: np.ndarray) -> np.ndarray:
         size = np.abs(wheels)
-        on, off = size >= self.threshold_m_s, size < self.threshold_m_s * self.stop_ratio
-        said = np.where(on, 1, np.where(off, -1, 0))
-        state = np.full_like(said[:, 0], -1)
-        out = np.zeros_like(wheels)
+        said = np.where(size >= self.threshold_m_s, 1, np.where(size < self.threshold_m_s * self.stop_ratio, -1, 0))
+        state, out = np.full_like(said[:, 0], -1), np.zeros_like(wheels)
         for i in range(wheels.shape[1]):
             state = np.where(said[:, i] != 0, said[:, i], state)
             out[:, i] = wheels[:, i] * (state > 0)

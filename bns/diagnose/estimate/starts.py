@@ -86,7 +86,8 @@ def fit_extended(problem: Problem, base: Fit, effect: Effect, given: bool = Fals
     starts = product(*(neutral[p.name] + (list(_grid(p)) if p.name in varied else []) for p in effect.parameters))
     jagged = any(p.jagged for p in own)
     bare = base.model if given else base.model.without(gone)
-    models = [bare.with_active(effect, values) for values in (*starts, *(effect.starts if jagged else ()))]
+    more = _starts(effect, problem.predictor, bare) if jagged else ()
+    models = [bare.with_active(effect, values) for values in (*starts, *more)]
     fit = problem.fit(min(models, key=problem.loss))
     return _from_lower_places(problem, fit) if jagged else fit
 

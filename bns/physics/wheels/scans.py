@@ -87,6 +87,20 @@ def broken_away(target: Array, step_s: Array, start: float, stop: float) -> Arra
 
 
 @exact
+def summed_while_on(size: Array, values: Array, starts: Array, stops: Array) -> Array:
+    """Of each pair of start and stop, (pairs,): the sum of ``values`` where `broken_away` is not 0; ``size`` is |target|."""
+    out = np.zeros(len(starts))
+    for pair in range(len(starts)):
+        for row in range(size.shape[0]):
+            turns = False
+            for k in range(size.shape[1]):
+                turns = size[row, k] >= (stops[pair] if turns else starts[pair])
+                if turns:
+                    out[pair] += values[row, k]
+    return out
+
+
+@exact
 def timed_out(left: Array, right: Array, step_s: Array, timeout_s: float) -> tuple[Array, Array]:
     """Mean over each step of two speeds that are 0 from ``timeout_s`` after the last change of either; exact."""
     mean_left, mean_right = np.zeros_like(left), np.zeros_like(right)
