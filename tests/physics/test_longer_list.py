@@ -287,6 +287,24 @@ def test_a_wheel_starts_at_a_higher_command_than_it_stops_at():
         assert simulate(model, [speeds], [speeds], [lasts])[0, -1, 0] == pytest.approx(driven)
 
 
+def test_thresholds_are_guessed_from_what_was_seen_or_not_at_all():
+    """Two wheels in steps of 0.1 s, and a tracker that saw them turn from 0.06 m/s on, until they were told less than 0.02."""
+    guess = effect_named("breakaway").starts_from
+    told = np.repeat([[0.05, 0.07, 0.03, 0.01, 0.03, 0.2, 0.0] * 6], 8, axis=1)
+    turned = told * np.repeat([[0, 1, 1, 0, 0, 1, 0] * 6], 8, axis=1)
+    along = np.cumsum(turned, axis=1) * 0.1 - turned * 0.05
+    seen = np.stack([along, np.zeros_like(along), np.zeros_like(along)], axis=2)
+    step = np.full(told.shape, 0.1)
+    ((threshold, ratio),) = guess(Wheels(step, told, told, B, Conditions(seen=seen)))
+    assert 0.05 < threshold <= 0.07
+    assert 0.01 < threshold * ratio <= 0.03
+    nothing = np.zeros_like(told)
+    assert guess(Wheels(step, told, told, B)) == ()
+    assert guess(Wheels(step, nothing, nothing, B, Conditions(seen=seen))) == ()
+    assert guess(Wheels(step, told, told, B, Conditions(seen=np.full_like(seen, np.nan)))) == ()
+    assert guess(Wheels(step[:, :2], told[:, :2], told[:, :2], B, Conditions(seen=seen[:, :2]))) == ()
+
+
 def test_a_robot_stops_when_no_new_command_comes():
     model = IDEAL.with_effect("command-timeout", timeout_s=0.5)
     speeds, lasts = [0.1, 0.1, 0.2, 0.0, 0.1], [0.3, 0.4, 1.0, 1.0, 0.2]

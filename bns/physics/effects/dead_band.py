@@ -34,7 +34,7 @@ EFFECT = Effect(
     equation="w = u where |u| > t, else 0, for each wheel",
     residuals="Slow commands are not driven at all, and all others as commanded: turns in which the inner wheel is slow are too "
     "sharp.",
-    lookalikes=("dead-zone", "stribeck"),
+    lookalikes=("dead-zone", "stribeck", "breakaway"),
     sentence="a wheel stands still while its command is below a threshold",
     sized="a wheel stands still while its command is below {threshold_m_s}",
     measurement="lift the robot, raise one wheel's command slowly from zero, and note the command at which the wheel begins to "

@@ -22,7 +22,7 @@ EFFECT = Effect(
     ),
     equation="dx/dt += sx, dy/dt += sy while moving",
     residuals="Positions are off in one direction of the floor at any heading, in proportion to the time driven.",
-    lookalikes=("tether-pull",),
+    lookalikes=("tether-pull", "carpet-drift"),
     sentence="the robot drifts in one direction of the floor, as on a slope",
     measurement="lay a spirit level on the floor, in two directions",
     beside={
