@@ -67,9 +67,9 @@ VALUES: dict[str, dict[str, float]] = {
     "speed-scaling": {"max_m_s": 0.1},
     "stribeck": {"width_m_s": 0.03, "fade_m_s": 0.05},
     "dead-band": {"threshold_m_s": 0.04},
-    "breakaway": {"threshold_m_s": 0.06, "stop_ratio": 0.4},
+    "breakaway": {"threshold_m_s": 0.1, "stop_ratio": 0.4},
     "carpet-drift": {"x_share": 0.1, "y_share": -0.05},
-    "command-timeout": {"timeout_s": 0.8},
+    "command-timeout": {"timeout_s": 2.2},
     "sliding-contact": {"friction_m_s": 0.02, "distance_share": 0.6, "left_share": 0.0},
     "supply-sag": {"loss_s_m": 1.0},
     "tether-load": {
