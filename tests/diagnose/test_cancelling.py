@@ -52,6 +52,15 @@ def test_a_number_that_a_term_multiplies_or_turns_round_cancels_a_part_of_it(wit
     assert not list(cancelled(fit_of(without), fit_of(beside), ()))
 
 
+def test_a_lag_that_differs_in_turns_has_one_size():
+    without, beside = (
+        (("inertia-lag", "tau_s", tau, 0.9 * tau, 1.1 * tau), ("inertia-lag", "turn_ratio", ratio, 0.9 * ratio, 1.1 * ratio))
+        for tau, ratio in ((0.25, 1.0), (1.24, 0.2))
+    )
+    (found,) = cancelled(fit_of(*without), fit_of(*beside), ("inertia-lag",))
+    assert found == Cancelled("inertia-lag", number_of("inertia-lag", "tau_s"), 0.25, 1.24)
+
+
 def test_of_an_effect_with_several_numbers_none_is_said_to_have_outgrown_the_others():
     without, beside = (
         (("floor-slope", "x_m_s", x, x, x), ("floor-slope", "y_m_s", 0.01, 0.01, 0.01)) for x in (0.001, 0.1)

@@ -15,7 +15,7 @@ OUTGROWN = DEFAULTS.verdict.outgrown
 
 
 class Cancelled(NamedTuple):
-    """An effect of one number: its value without a term and with one that it cancels in part."""
+    """An effect of one size: its value without a term and with one that it cancels in part."""
 
     name: str
     parameter: Parameter
@@ -24,11 +24,11 @@ class Cancelled(NamedTuple):
 
 
 def cancelled(without: Fit, beside: Fit, accepted: Sequence[str]) -> Iterator[Cancelled]:
-    """Effects of one number that a term takes certainly to the other side of neutral, or certainly much further from it.
+    """Effects of one size that a term takes certainly to the other side of neutral, or certainly much further from it.
 
     ``without``, ``beside``: fits without the term and with it. By the ends of 95 % intervals.
     """
-    before, after = _only_numbers(without), _only_numbers(beside)
+    before, after = _sizes(without), _sizes(beside)
     for name in accepted:
         if name in before and name in after:
             (p, value, low, high), (_, value_beside, low_beside, high_beside) = before[name], after[name]
@@ -39,15 +39,18 @@ def cancelled(without: Fit, beside: Fit, accepted: Sequence[str]) -> Iterator[Ca
                 yield Cancelled(name, p, value, value_beside)
 
 
-def _only_numbers(fit: Fit) -> dict[str, tuple[Parameter, float, float, float]]:
-    """Of effects with one fitted number: which, its value, and the ends of its interval from neutral."""
+def _sizes(fit: Fit) -> dict[str, tuple[Parameter, float, float, float]]:
+    """Of effects with one size, by name: which number it is, its value, and the ends of its interval from neutral.
+
+    That is an only number, or the only one that is no multiple of another: a lag is, and how often it is as long in turns is not.
+    """
     each: dict[str, list[int]] = {}
     for index, number in enumerate(fit.free):
         each.setdefault(number.effect, []).append(index)
     found = {}
     for name, indices in each.items():
-        p = fit.free[indices[0]].parameter
-        if len(indices) == 1 and np.isfinite(p.neutral):
-            low, high = (end - p.neutral for end in fit.interval(indices[0]))
-            found[name] = p, float(fit.values[indices[0]]), low, high
+        sizes = indices if len(indices) == 1 else [i for i in indices if not fit.free[i].parameter.is_multiple]
+        if len(sizes) == 1 and np.isfinite((p := fit.free[sizes[0]].parameter).neutral):
+            low, high = (end - p.neutral for end in fit.interval(sizes[0]))
+            found[name] = p, float(fit.values[sizes[0]]), low, high
     return found
