@@ -44,6 +44,7 @@ GUESSES: dict[str, Guess] = {  # parameter: (start, step, least, most)
     "side-slip": {"slip_s": (0.0, 0.05, -1.0, 1.0)},
     "battery-sag": {"rate_per_s": (1e-5, 5e-5, 0.0, 5e-4)},
     "floor-slope": {"x_m_s": (0.0, 0.005, -0.1, 0.1), "y_m_s": (0.0, 0.005, -0.1, 0.1)},
+    "carpet-drift": {"x_share": (0.0, 0.01, -0.5, 0.5), "y_share": (0.0, 0.01, -0.5, 0.5)},
     "yaw-bias": {"rate_rad_s": (0.0, 0.03, -1.0, 1.0)},
     "tether-pull": {
         "anchor_x_m": (0.8, 1.0, -12.0, 12.0),
