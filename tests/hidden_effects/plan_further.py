@@ -104,11 +104,12 @@ BESIDE: dict[str, dict[str, Parameters]] = {"wheel-diameters": {"acceleration-li
 """What an effect needs beside it to differ from a simpler one: without limits, diameters are a mismatch of commands."""
 ALIKE = {
     "slope-load": ("tether-load",),
+    "floor-patch": ("wheel-patch", "uneven-patch"),
     "wheel-patch": ("floor-patch", "uneven-patch"),
     "uneven-patch": ("floor-patch", "wheel-patch"),
     "wheel-diameters": ("wheel-mismatch",),
 }
-"""What would stand in for an effect that is taken out: a slope is a cable from far away."""
+"""What would stand in for an effect that is taken out: a slope is a cable from far away, and one patch contains another."""
 TURNING = {
     "backlash",
     "braking-lag",
