@@ -6,6 +6,8 @@ A wheel whose command jumps to the other direction is not held: it does not rest
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from bns.physics.effect import Effect, Parameter
@@ -73,7 +75,7 @@ EFFECT = Effect(
     name="breakaway",
     stage="wheel",
     parameters=(
-        *ALIKE.parameters,
+        replace(ALIKE.parameters[0], text="command at which a wheel at rest starts"),
         Parameter(
             "stop_ratio",
             "1",
