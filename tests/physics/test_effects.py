@@ -22,7 +22,7 @@ from bns.registry import EFFECTS
 
 SIGNALS = dict(zip(STAGES, (Wheels, Body, Flow, Stamps, View), strict=True))
 IDEAL = Model(wheelbase_m=0.0884)
-LEFT = np.array([[0.10, 0.20, -0.05, 0.02], [0.15, 0.0, 0.07, 0.0], [0.2, 0.2, 0.1, 0.15]])
+LEFT = np.array([[0.09, 0.20, -0.05, 0.02], [0.15, 0.0, 0.07, 0.0], [0.2, 0.2, 0.1, 0.15]])
 RIGHT = np.array([[0.20, 0.05, 0.10, 0.02], [0.15, 0.1, -0.07, 0.0], [0.2, 0.1, 0.2, 0.15]])
 DURATION = np.array([[1.0031, 0.5, 0.7507, 0.301], [0.31, 0.9, 0.42, 0.0], [0.5, 0.25, 0.333, 0.444]])
 
