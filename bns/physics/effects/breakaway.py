@@ -13,7 +13,7 @@ import numpy as np
 from bns.physics.effect import Effect, Parameter
 from bns.physics.effects.dead_band import EFFECT as ALIKE
 from bns.physics.signals import Array, Wheels
-from bns.physics.wheels.scans import broken_away, summed_while_on
+from bns.physics.wheels.standing import broken_away, summed_while_on
 
 _SLOW, _FAST, _MANY = 0.01, 0.6, 48
 """Thresholds are looked for at so many values between these fractions of the highest speeds: no robot stands at most commands."""

@@ -11,7 +11,7 @@ import math
 
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Wheels
-from bns.physics.wheels.scans import timed_out
+from bns.physics.wheels.standing import timed_out
 
 
 def apply(wheels: Wheels, timeout_s: float) -> Wheels:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Wheels
-from bns.physics.wheels.scans import paused
+from bns.physics.wheels.standing import paused
 
 
 def apply(wheels: Wheels, pause_s: float) -> Wheels:

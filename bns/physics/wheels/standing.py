@@ -1,0 +1,74 @@
+"""Wheels that stand though they are told to turn, compiled. Arrays are (batch, steps)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bns.engine.jit import exact
+from bns.physics.signals import Array
+
+
+@exact
+def paused(target: Array, step_s: Array, pause_s: float) -> Array:
+    """Mean over each step of a speed that is 0 within ``pause_s`` after the last step of the other direction."""
+    mean = np.zeros_like(target)
+    for row in range(target.shape[0]):
+        direction, since_s = 0.0, 0.0
+        for k in range(target.shape[1]):
+            h, u = step_s[row, k], target[row, k]
+            if h == 0.0:
+                continue
+            stands_s = min(max(pause_s - since_s, 0.0), h) if u * direction < 0.0 else 0.0
+            if u != 0.0 and stands_s < h:
+                direction, since_s = np.sign(u), 0.0
+            else:
+                since_s += h
+            mean[row, k] = u * (1.0 - stands_s / h)
+    return mean
+
+
+@exact
+def broken_away(target: Array, step_s: Array, start: float, stop: float) -> Array:
+    """The target from ``start`` on until it is below ``stop``, in size, else 0; a trial begins at rest."""
+    out = np.zeros_like(target)
+    for row in range(target.shape[0]):
+        turns = False
+        for k in range(target.shape[1]):
+            if step_s[row, k] == 0.0:
+                continue
+            turns = abs(target[row, k]) >= (stop if turns else start)
+            if turns:
+                out[row, k] = target[row, k]
+    return out
+
+
+@exact
+def summed_while_on(size: Array, values: Array, starts: Array, stops: Array) -> Array:
+    """Of each pair of start and stop, (pairs,): the sum of ``values`` where `broken_away` is not 0; ``size`` is |target|."""
+    out = np.zeros(len(starts))
+    for pair in range(len(starts)):
+        for row in range(size.shape[0]):
+            turns = False
+            for k in range(size.shape[1]):
+                turns = size[row, k] >= (stops[pair] if turns else starts[pair])
+                if turns:
+                    out[pair] += values[row, k]
+    return out
+
+
+@exact
+def timed_out(left: Array, right: Array, step_s: Array, timeout_s: float) -> tuple[Array, Array]:
+    """Mean over each step of two speeds that are 0 from ``timeout_s`` after the last change of either; exact."""
+    mean_left, mean_right = np.zeros_like(left), np.zeros_like(right)
+    for row in range(left.shape[0]):
+        before_left, before_right, since_s = 0.0, 0.0, 0.0
+        for k in range(left.shape[1]):
+            h, u, v = step_s[row, k], left[row, k], right[row, k]
+            if h == 0.0:
+                continue
+            if u != before_left or v != before_right:
+                before_left, before_right, since_s = u, v, 0.0
+            share = min(max(timeout_s - since_s, 0.0) / h, 1.0)
+            mean_left[row, k], mean_right[row, k] = share * u, share * v
+            since_s += h
+    return mean_left, mean_right
