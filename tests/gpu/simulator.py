@@ -1,13 +1,18 @@
 """Numba's CUDA simulator, made fit for these kernels: Python threads, no GPU, no driver.
 
-It lacks three things. Warps cannot exchange values there; its arrays cannot be handed to the compiled functions that kernels
-share with the CPU engine: here kernels see plain numpy arrays; and its threads wait for each other in a busy loop.
+It lacks four things. Warps cannot exchange values there; its arrays cannot be handed to the compiled functions that kernels
+share with the CPU engine: here kernels see plain numpy arrays; its threads wait for each other in a busy loop; and two threads
+that come to a shared array at the same moment are given one each.
 """
 
+import sys
 import threading
 
 import numpy as np
 from numba.cuda.simulator import kernel, kernelapi
+from numba.np.numpy_support import as_dtype
+
+_ALLOCATING = threading.Lock()
 
 
 def _shfl_xor_sync(self, mask, value, apart):
@@ -51,3 +56,16 @@ def _run(self, place, *arguments):
 
 kernel.BlockManager.run = _run
 kernel.BlockThread.syncthreads = lambda thread: thread._manager.barrier.wait()
+
+
+def _array(self, shape, dtype):
+    """One array for each line of a kernel, whichever of its threads comes there first. Kernels here ask for no dynamic memory."""
+    caller = sys._getframe(1)
+    where = (caller.f_code, caller.f_lineno)
+    with _ALLOCATING:
+        if where not in self._allocations:
+            self._allocations[where] = np.empty(shape, as_dtype(dtype))
+        return self._allocations[where]
+
+
+kernelapi.FakeCUDAShared.array = _array
