@@ -6,20 +6,20 @@ or begins with ``k_``. Any other name is an error: a misspelt column must not be
 
 from __future__ import annotations
 
-import ast
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from bns.errors import ModelError, unknown_name
 from bns.physics.effect import Effect, Parameter
-from bns.physics.formula_check import AGO, checked_formula
+from bns.physics.formula_check import AGO
+from bns.physics.formula_value import Ago, Compiled, compiled
 from bns.physics.order import FORMULAS
 from bns.physics.signals import CREEP_M_S, Array, Body
-from bns.physics.wheels.scans import averaged, carried_on, first_order, reversed_since, trailing
+from bns.physics.wheels.scans import carried_on, first_order, reversed_since, trailing
 
 SHARE, WHEELS, LEFT, RIGHT = "share", "wheels", "left", "right"
 ON: Mapping[str, str] = {
@@ -71,19 +71,6 @@ RECENT_S = 0.15
 NEVER_M = 1e3
 LARGEST = 1e9
 """Of a number in a term. At 1 mm/s a speed that is halved by a term in v**3 has a number of 5e5, in v**4 of 5e8."""
-FUNCTIONS: Mapping[str, Callable[..., Any]] = {
-    "abs": np.abs,
-    "sign": np.sign,
-    "sqrt": np.sqrt,
-    "exp": np.exp,
-    "log": np.log,
-    "sin": np.sin,
-    "cos": np.cos,
-    "tanh": np.tanh,
-    "min": np.minimum,
-    "max": np.maximum,
-    "round": np.round,
-}
 _PLACE = {"x", "y", "heading"}
 _NUMBER = re.compile(r"[A-Za-z]\d*|k_\w+")
 
@@ -140,9 +127,7 @@ def _is_linear(code: Compiled, numbers: Sequence[str]) -> bool:
     rest[AGO] = lambda from_s, to_s: np.linspace(from_s, to_s, 16)
 
     def value(at: Array) -> Array:
-        with np.errstate(all="ignore"):
-            found = eval(code.code, {"__builtins__": {}}, {**FUNCTIONS, **rest, **dict(zip(numbers, at, strict=True))})
-        return np.asarray(found, dtype=np.float64)
+        return np.asarray(code.value({**rest, **dict(zip(numbers, at, strict=True))}), dtype=np.float64)
 
     for one, other in rng.normal(size=(4, 2, len(numbers))):  # some of them of other signs: an absolute value is not linear
         try:
@@ -156,10 +141,7 @@ def _is_linear(code: Compiled, numbers: Sequence[str]) -> bool:
 
 def value_of(term: str, names: Mapping[str, Any]) -> Array:
     """The value of a term for given numbers and arrays, one for each of its names; ModelError if it is no formula."""
-    code = _parsed("term", term)
-    with np.errstate(all="ignore"):
-        value = eval(code.code, {"__builtins__": {}}, {**FUNCTIONS, **names})  # checked by _parsed
-    return np.asarray(value, dtype=np.float64)
+    return np.asarray(_parsed("term", term).value(names), dtype=np.float64)
 
 
 def names_in(term: str) -> set[str]:
@@ -185,26 +167,8 @@ def _sorted(name: str, names: set[str], columns: set[str], numbers: set[str] | N
     return logged, unknown
 
 
-class Compiled:
-    """A checked term, ready to be calculated, and the names in it; pickled as its text."""
-
-    def __init__(self, name: str, term: str) -> None:
-        self._made_of = name, term
-        tree = checked_formula(f"formula {name}", term, (*FUNCTIONS, *PAST))
-        calls = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
-        self.called = {function.id for function in calls if isinstance(function, ast.Name)}
-        self.names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)} - self.called
-        self.code = compile(tree, name, "eval")
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Compiled, self._made_of
-
-
 def _parsed(name: str, term: str) -> Compiled:
-    return _remembered(name, term) if isinstance(term, str) else Compiled(name, term)  # a model file may hold anything
-
-
-_remembered = lru_cache(maxsize=4096)(Compiled)  # a search asks for the same few hundred terms again and again
+    return compiled(name, term) if isinstance(term, str) else Compiled(name, term)  # a model file may hold anything
 
 
 def _apply(name: str, code: Compiled, on: str, logged: list[str], body: Body, **numbers: float) -> Body:
@@ -233,8 +197,7 @@ def _added(name: str, code: Compiled, values: Mapping[str, Any], body: Body) -> 
     """The term's value in every step, (batch, steps)."""
     numbers = {key: value for key, value in values.items() if isinstance(value, float)}
     try:
-        with np.errstate(all="ignore"):
-            added = np.asarray(eval(code.code, {"__builtins__": {}}, {**FUNCTIONS, **values}))  # checked by _parsed
+        added = np.asarray(code.value_of_numbers(values))
     except (ArithmeticError, TypeError, ValueError) as fault:  # of numbers that are fitted: k / (k - k), (-k)**0.5
         raise ModelError(
             f"formula {name} cannot be calculated with {numbers}: {fault}. Write it in another way."
@@ -253,26 +216,27 @@ def _added(name: str, code: Compiled, values: Mapping[str, Any], body: Body) -> 
 
 
 def _needs(code: Compiled, on: str) -> bool:
-    return on in {"east", "north"} or bool(_PLACE & set(code.code.co_names))
+    return on in {"east", "north"} or bool(_PLACE & code.names)
 
 
 def _values(body: Body, code: Compiled) -> dict[str, Any]:
+    """`VARIABLES`; only what the term names."""
     begin = body.session_s[:, :1]
-    values: dict[str, Any] = {
-        "v": body.forward_m_s,
-        "w": body.yaw_rad_s,
-        "l": body.left_m_s,
-        "r": body.right_m_s,
-        "t": body.session_s,
-        "tau": body.session_s - begin,
-        "d": np.cumsum(np.abs(body.forward_m_s) * np.diff(body.session_s, axis=1, prepend=begin), axis=1),
-        "moving": body.moving,
+    made: dict[str, Callable[[], Array]] = {
+        "v": lambda: body.forward_m_s,
+        "w": lambda: body.yaw_rad_s,
+        "l": lambda: body.left_m_s,
+        "r": lambda: body.right_m_s,
+        "t": lambda: body.session_s,
+        "tau": lambda: body.session_s - begin,
+        "d": lambda: np.cumsum(np.abs(body.forward_m_s) * np.diff(body.session_s, axis=1, prepend=begin), axis=1),
+        "moving": lambda: body.moving,
+        "swing": lambda: swing(body),
     }
     if body.place is not None:
-        values |= {"x": body.place[..., 0], "y": body.place[..., 1], "heading": body.place[..., 2]}
-    if "swing" in code.code.co_names:
-        values["swing"] = swing(body)
-    return values
+        x, y, heading = np.moveaxis(body.place, -1, 0)
+        made |= {"x": lambda: x, "y": lambda: y, "heading": lambda: heading}
+    return {name: make() for name, make in made.items() if name in code.names}
 
 
 def _of_wheel(body: Body, speed: Array, code: Compiled) -> dict[str, Any]:
@@ -284,16 +248,13 @@ def _of_wheel(body: Body, speed: Array, code: Compiled) -> dict[str, Any]:
         "lately10": lambda: lately(body, speed, 10.0),
         "lately100": lambda: lately(body, speed, 100.0),
     }
-    return {**_past(body, speed, code), **{name: make() for name, make in made.items() if name in code.code.co_names}}
+    return {**_past(body, speed, code), **{name: make() for name, make in made.items() if name in code.names}}
 
 
 def _past(body: Body, velocity: Array, code: Compiled) -> dict[str, Any]:
     """`PAST` of a velocity, where the term asks for it."""
 
-    def ago(from_s: float, to_s: float) -> Array:
-        return averaged(velocity, _step_s(body), float(from_s), float(to_s))
-
-    return {AGO: ago} if AGO in code.called else {}
+    return {AGO: Ago(velocity, _step_s(body))} if AGO in code.called else {}
 
 
 def lately(body: Body, speed: Array, fade_s: float) -> Array:

@@ -19,7 +19,8 @@ from bns.diagnose.residuals.symbolic import Formula
 from bns.errors import ModelError
 from bns.measurements import write_measurements
 from bns.physics.effects import effect_in_file
-from bns.physics.formula import FUNCTIONS, ON, PAST, VARIABLES, formula_effect
+from bns.physics.formula import ON, PAST, VARIABLES, formula_effect
+from bns.physics.formula_value import FUNCTIONS
 from bns.physics.model import parse_model
 from tests.diagnose.worlds import NOMINAL, measured
 
