@@ -22,6 +22,7 @@ from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.paired_errors import PairedErrors, noise_json, plain
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.along_variables import ResidualDependence
+from bns.diagnose.residuals.established import curve_does_better
 from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.residuals.unexplained import NOTHING, Unexplained
 from bns.diagnose.residuals.words import in_words
@@ -260,13 +261,15 @@ def _diagnosed(
     before: SelectionResult | None = None,
 ) -> Diagnosis:
     """One search, and what it leaves; ``before``: a search on nearly the same, whose end or numbers may serve here too."""
-    search = StepwiseSelection(predictor, model, extra, tick, barred, alone)
+    search = StepwiseSelection(predictor, model, extra, tick, barred, alone, curve_does_better=curve_does_better)
     reason = too_little(predictor.tracks, fewest_trials(search.level))
     if reason:
         return Diagnosis("insufficient-data", None, notes=(reason,))
     found = outcome_of(_from_better_numbers(search.run(before), before), predictor, model, tick)
     if found.own_clocks and model.per_trial_effect is None and found.rest.any:
-        shared = StepwiseSelection(predictor, model, extra, tick, barred, own_clocks=False)
+        shared = StepwiseSelection(
+            predictor, model, extra, tick, barred, own_clocks=False, curve_does_better=curve_does_better
+        )
         without = outcome_of(_from_better_numbers(shared.run(), before), predictor, model, tick)
         found = found if predicts_better_throughout(found, without) else without
     if found.fewer and isinstance(predictor, WheelPredictor):  # of a body it would take minutes

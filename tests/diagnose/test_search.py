@@ -14,10 +14,11 @@ from bns.diagnose.estimate.plausibility import implausible
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_with, listed
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.residuals.established import curve_does_better
 from bns.diagnose.select.result import SelectionResult, SelectionStep
 from bns.diagnose.select.stepwise import StepwiseSelection
 from bns.physics.decoys import DECOYS
-from bns.physics.effects import effect_named
+from bns.physics.effects import all_effects, effect_named
 from bns.physics.formula import formula_effect
 from bns.physics.model import ActiveEffect
 from tests.diagnose.worlds import NOMINAL, hidden, measured
@@ -278,3 +279,43 @@ def test_a_sign_is_worth_more_trials_only_where_few_nearly_sufficed(change, hint
     nominal = SimpleNamespace(losses=np.full(12, given["losses"]))
     found = SimpleNamespace(accepted=given["accepted"], steps=(SelectionStep((candidate,), 0.5, ""),), nominal=nominal)
     assert (diagnosis._hint(found, given["trials"]) is candidate) is hinted
+
+
+@pytest.mark.parametrize("better", [False, True])
+def test_beside_several_effects_the_search_ends_where_a_curve_does_better(monkeypatch, better):
+    """What is on no list is imitated by one effect after the other, and each is sought longer than the one before."""
+    monkeypatch.setattr("bns.diagnose.select.stepwise.CURVE_FROM", 1)
+    asked = []
+
+    def curve_does_better(problem, fit, added):
+        asked.append({f.effect for f in added.free} - {f.effect for f in fit.free})
+        assert added.loss < fit.loss == pytest.approx(problem.loss(fit.model))
+        return better
+
+    predictor = WheelPredictor(tracks_of(measured(hidden(speed_gain={"gain": 0.96}, wheelbase={"factor": 1.08}), seed=11)))
+    others = set(all_effects()) - {"speed-gain", "wheelbase", "motor-lag"}
+    search = StepwiseSelection(predictor, NOMINAL, barred=others, curve_does_better=curve_does_better)
+    found = search.run()
+    assert len(found.accepted) == (1 if better else 2)
+    assert [step.selected != "" for step in found.steps] == [True, *([] if better else [True]), False]
+    assert asked[0] == {"speed-gain", "wheelbase"} - set(found.accepted[:1])
+    if better:
+        assert len(found.steps[-1].ranking) == 2
+        again = search.stands(found)
+        assert again is not None
+        assert again.accepted == found.accepted
+
+
+@pytest.mark.parametrize(("unlisted", "better"), [(False, False), (True, True)])
+def test_a_curve_does_better_only_than_an_effect_that_is_not_there(unlisted, better):
+    true = hidden(wheelbase={"factor": 1.05})
+    if unlisted:
+        true = NOMINAL.with_active(formula_effect("rough", "k * exp(-tau / 2)", "share"), (-0.15,))
+    predictor = WheelPredictor(tracks_of(measured(true, trials=20, seed=11)))
+    problem = problem_for(predictor, NOMINAL)
+    fit = problem.fit(NOMINAL)
+    added = fit_with(problem, fit, listed(NOMINAL, None, predictor.tracks)["wheelbase"])
+    assert curve_does_better(problem, fit, added) is better
+    if unlisted:
+        clocks = SimpleNamespace(model=SimpleNamespace(per_trial_effect="clock-offset"))
+        assert not curve_does_better(problem, clocks, added)

@@ -123,6 +123,30 @@ def left_over(problem: Problem, fit: Fit, response: bool = True) -> bool:
     return bool(_curves(problem, fit, families(problem.predictor, fit.model.wheelbase_m, response), ()))
 
 
+def curve_does_better(problem: Problem, fit: Fit, added: Fit) -> bool:
+    """Does a flexible term that earns its place predict better for certain than one more effect, ``added``, does?
+
+    Not asked where no terms are looked for: bodies on joints, single relative motions, trials with clocks of their own.
+    """
+    if problem.predictor.tracks.relative or fit.model.per_trial_effect is not None:
+        return False
+    grammar = families(problem.predictor, fit.model.wheelbase_m, False)
+    return _better_term(problem, fit, _curves(problem, fit, grammar, ()), added, FALSE_ALARM / max(len(grammar), 1)) is not None
+
+
+def _better_term(
+    problem: Problem, fit: Fit, curves: Sequence[Earned], effect: Fit | None, level: float
+) -> Formula | None:
+    """The first of the curves that can be written out and earns its place, while these are clearly better than the effect."""
+    for curve in curves:
+        if effect is not None and not _clearly_better(curve, effect, fit):
+            break
+        term = _written_out(problem, fit, curve.family)
+        if term is not None and _term_earns(term.paired_comparison, fit, level):
+            return term
+    return None
+
+
 def _step(
     predictor: Predictor, state: _State, left: Mapping[str, Effect], grammar: Sequence[Family], level: float
 ) -> _State | None:
@@ -132,12 +156,9 @@ def _step(
     earned = {name: one for name, one in tried.items() if _earns(problem.paired_comparison(fit, one), fit, level)}
     best = min(earned, key=lambda name: float(earned[name].held_out.sum()), default="")
     curves = _curves(problem, fit, grammar, state.terms)
-    for curve in curves:
-        if best and not _clearly_better(curve, earned[best], fit):
-            break
-        term = _written_out(problem, fit, curve.family)
-        if term is not None and _term_earns(term.paired_comparison, fit, level):
-            return replace(state.settled(predictor, term.fit), terms=(*state.terms, term))
+    term = _better_term(problem, fit, curves, earned.get(best), level)
+    if term is not None:
+        return replace(state.settled(predictor, term.fit), terms=(*state.terms, term))
     if not best:
         return None
     return replace(state.settled(predictor, earned[best]), names=(*state.names, best))

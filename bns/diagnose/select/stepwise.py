@@ -41,12 +41,14 @@ MIN_GAIN = DEFAULTS.select.min_gain
 BEHIND = DEFAULTS.select.behind
 CLOCKS_CHANCE = DEFAULTS.select.clocks_chance
 MOST = DEFAULTS.select.most_effects
+CURVE_FROM = DEFAULTS.select.curve_from
 
 
 class StepwiseSelection:
     """A search for the effects that ``model`` lacks, on the tracks of a predictor.
 
-    ``own_clocks``: may each trial have a clock of its own?
+    ``own_clocks``: may each trial have a clock of its own? ``curve_does_better``: asked of a problem, the fit before and the fit
+    with one more effect: does a curve of any form predict better for certain than that effect?
     """
 
     def __init__(
@@ -58,9 +60,10 @@ class StepwiseSelection:
         barred: Collection[str] = (),
         alone: Callable[[Candidate], None] = lambda _: None,
         own_clocks: bool = True,
+        curve_does_better: Callable[[Problem, Fit, Fit], bool] = lambda _problem, _fit, _added: False,
     ) -> None:
         self.predictor, self.model, self.tick, self.alone = predictor, model.arranged(), tick, alone
-        self._barred, self._own_clocks = barred, own_clocks
+        self._barred, self._own_clocks, self._curve_does_better = barred, own_clocks, curve_does_better
         self.catalogue = listed(self.model, extra, predictor.tracks, barred)
         self._worth = dict(self.catalogue) if predictor.screening is None else {}
         self._exchanges = Exchanges(predictor, self.catalogue, self._worth, tick)
@@ -141,7 +144,7 @@ class StepwiseSelection:
         tried: set[frozenset[str]] = set()
         while len(accepted) < MOST:
             before = problem, fit
-            step, problem, fit = self._forward_step(problem, fit, accepted)
+            step, problem, fit = self._next_step(problem, fit, accepted)
             steps.append(step)
             if not step.selected:
                 break
@@ -185,7 +188,7 @@ class StepwiseSelection:
             return None
         if self._exchange_step(problem, fit, accepted)[2] != accepted:
             return None
-        step = self._forward_step(problem, fit, accepted)[0] if len(accepted) < MOST else before.steps[-1]
+        step = self._next_step(problem, fit, accepted)[0] if len(accepted) < MOST else before.steps[-1]
         return None if step.selected else self._ended(problem, fit, accepted, [*before.steps[:-1], step])
 
     def _ended(
@@ -203,6 +206,17 @@ class StepwiseSelection:
     def _refit_with_noise(self, model: Model, start: Array | None = None) -> tuple[Problem, Fit]:
         """Noise and numbers that belong together."""
         return settled_problem(self.predictor, model, start)
+
+    def _next_step(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> tuple[SelectionStep, Problem, Fit]:
+        """A step forwards; none beside several effects where a curve does better: the list lacks what is missing."""
+        forwards = self._forward_step(problem, fit, accepted)
+        step = forwards[0]
+        if not step.selected or len(accepted) < CURVE_FROM:
+            return forwards
+        added = next(c.fit for c in step.ranking if c.name == step.selected)
+        if not self._curve_does_better(problem, fit, added):
+            return forwards
+        return replace(step, selected="", instead_of=""), problem, fit
 
     def _forward_step(
         self, problem: Problem, fit: Fit, accepted: tuple[str, ...]

@@ -72,6 +72,12 @@ class Select:
     clocks_chance: float = setting(
         0.01, "1", f"Probability of a false alarm about clocks that differ between trials; {BY_HAND}."
     )
+    curve_from: int = setting(
+        3,
+        "effects",
+        "Beside so many accepted effects the search ends where a curve of any form predicts better for certain than the next "
+        "effect.",
+    )
     most_effects: int = setting(
         6,
         "effects",
