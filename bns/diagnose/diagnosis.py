@@ -268,7 +268,7 @@ def _diagnosed(
     found = outcome_of(_from_better_numbers(search.run(before), before), predictor, model, tick)
     if found.own_clocks and model.per_trial_effect is None and found.rest.any:
         shared = StepwiseSelection(
-            predictor, model, extra, tick, barred, own_clocks=False, curve_does_better=curve_does_better
+            predictor, model, extra, tick, barred, own_clocks=False, curve_does_better=curve_does_better, begun=search
         )
         without = outcome_of(_from_better_numbers(shared.run(), before), predictor, model, tick)
         found = found if predicts_better_throughout(found, without) else without

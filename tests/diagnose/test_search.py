@@ -319,3 +319,26 @@ def test_a_curve_does_better_only_than_an_effect_that_is_not_there(unlisted, bet
     if unlisted:
         clocks = SimpleNamespace(model=SimpleNamespace(per_trial_effect="clock-offset"))
         assert not curve_does_better(problem, clocks, added)
+
+
+def test_a_search_without_clocks_of_the_trials_begins_where_the_one_with_them_did(with_a_gain, monkeypatch):
+    asked, select = [], StepwiseSelection._select
+    monkeypatch.setattr(StepwiseSelection, "_select", lambda search: asked.append(search) or select(search))
+    predictor, others = WheelPredictor(tracks_of(with_a_gain[0])), set(all_effects()) - {"speed-gain", "motor-lag"}
+    search = StepwiseSelection(predictor, NOMINAL, barred=others)
+    found = search.run()
+    assert StepwiseSelection(predictor, NOMINAL, barred=others, own_clocks=False, begun=search).run() is found
+    assert asked == [search]
+    again = StepwiseSelection(predictor, NOMINAL, barred=others)
+    again.run(found)  # the end of a search on nearly the same is no beginning
+    StepwiseSelection(predictor, NOMINAL, barred=others, own_clocks=False, begun=again).run()
+    assert len(asked) == 2
+
+
+def test_a_bold_search_is_another_one(with_a_gain):
+    predictor, others = WheelPredictor(tracks_of(with_a_gain[0])), set(all_effects()) - {"speed-gain", "motor-lag"}
+    search = StepwiseSelection(predictor, NOMINAL, barred=others)
+    found = search.run()
+    search._all_believed = True
+    assert search._run() is not found
+    assert search._plain is found

@@ -48,7 +48,8 @@ class StepwiseSelection:
     """A search for the effects that ``model`` lacks, on the tracks of a predictor.
 
     ``own_clocks``: may each trial have a clock of its own? ``curve_does_better``: asked of a problem, the fit before and the fit
-    with one more effect: does a curve of any form predict better for certain than that effect?
+    with one more effect: does a curve of any form predict better for certain than that effect? ``begun``: a search for the same
+    on the same tracks; where it searched without clocks of the trials first, that is not done again.
     """
 
     def __init__(
@@ -61,6 +62,7 @@ class StepwiseSelection:
         alone: Callable[[Candidate], None] = lambda _: None,
         own_clocks: bool = True,
         curve_does_better: Callable[[Problem, Fit, Fit], bool] = lambda _problem, _fit, _added: False,
+        begun: StepwiseSelection | None = None,
     ) -> None:
         self.predictor, self.model, self.tick, self.alone = predictor, model.arranged(), tick, alone
         self._barred, self._own_clocks, self._curve_does_better = barred, own_clocks, curve_does_better
@@ -68,6 +70,8 @@ class StepwiseSelection:
         self._worth = dict(self.catalogue) if predictor.screening is None else {}
         self._exchanges = Exchanges(predictor, self.catalogue, self._worth, tick)
         self._all_believed = False
+        self._plain: SelectionResult | None = begun._plain if begun is not None else None
+        """Where the search without clocks of the trials ended; with implausible numbers allowed it is another."""
         self._least_z = MIN_Z if predictor.luck is None else MIN_Z_STRETCHES
         self.level = FALSE_ALARM / max(len(self.catalogue), 1)
 
@@ -87,7 +91,10 @@ class StepwiseSelection:
 
     def _run(self, before: SelectionResult | None = None) -> SelectionResult:
         """The search; again with a clock for each trial where these differ, since that hides what else is wrong."""
-        plain = (self.stands(before) if before else None) or self._select()
+        known = self.stands(before) if before else None if self._all_believed else self._plain
+        plain = known or self._select()
+        if not (before or self._all_believed):
+            self._plain = plain
         clocks = fit_trial_clocks(plain.problem, plain.fit) if self._own_clocks else None
         if clocks is None or _per_trial_effect(clocks.fit.model) in self._barred:
             return plain
