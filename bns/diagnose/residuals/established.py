@@ -19,6 +19,7 @@ from bns.diagnose.estimate.plausibility import implausible
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.significance import MIN_Z, PairedComparison, paired_elpd_diff
 from bns.diagnose.estimate.starts import fit_with
+from bns.diagnose.parallel import each
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.paired_errors import paired_errors
 from bns.diagnose.residuals.along_variables import residual_dependence
@@ -74,6 +75,12 @@ class _State:
     terms: tuple[Formula, ...] = ()
     known: Model | None = None
     """The model that a search without terms ended in."""
+
+    def lacking(self, names: Sequence[str]) -> dict[str, Fit]:
+        """The fits without each of some effects or terms."""
+        model, near = self.fit.model, self.fit.jacobian_by_parameter
+        fits = each(lambda name: self.problem.fit(model.without(name), nearby=near), names)
+        return dict(zip(names, fits, strict=True))
 
     def without(self, predictor: Predictor, name: str, lacking: Fit) -> _State:
         """The same without an effect; ``lacking``: fitted without it."""
@@ -152,7 +159,7 @@ def _step(
 ) -> _State | None:
     """The best effect or term added; None where neither earns anything."""
     problem, fit = state.problem, state.fit
-    tried = {name: fit_with(problem, fit, effect, state.known) for name, effect in left.items()}
+    tried = _tried(problem, fit, left, state.known)
     earned = {name: one for name, one in tried.items() if _earns(problem.paired_comparison(fit, one), fit, level)}
     best = min(earned, key=lambda name: float(earned[name].held_out.sum()), default="")
     curves = _curves(problem, fit, grammar, state.terms)
@@ -162,6 +169,11 @@ def _step(
     if not best:
         return None
     return replace(state.settled(predictor, earned[best]), names=(*state.names, best))
+
+
+def _tried(problem: Problem, fit: Fit, effects: Mapping[str, Effect], known: Model | None) -> dict[str, Fit]:
+    """The fits with each of some effects added."""
+    return dict(zip(effects, each(lambda one: fit_with(problem, fit, one, known), list(effects.values())), strict=True))
 
 
 def _curves(problem: Problem, fit: Fit, grammar: Sequence[Family], terms: Sequence[Formula]) -> list[Earned]:
@@ -236,10 +248,7 @@ def _without_idle_terms(predictor: Predictor, state: _State, level: float) -> _S
     rules it, and the one step that leaves this trial out then overshoots.
     """
     while len(state.terms) > 1:
-        lacking = {
-            term.name: state.problem.fit(state.fit.model.without(term.name), nearby=state.fit.jacobian_by_parameter)
-            for term in state.terms
-        }
+        lacking = state.lacking([term.name for term in state.terms])
         fitted_share = {name: 1.0 - state.fit.loss / one.loss for name, one in lacking.items()}
         least = min(fitted_share, key=lambda name: fitted_share[name])
         comparison = state.problem.paired_comparison(lacking[least], state.fit)
@@ -291,7 +300,7 @@ def _exchanged(
     bare = fit = problem.fit(model)
     names = state.names
     while _share(bare, fit, state.fit) < SPANNED:
-        tried = {n: fit_with(problem, fit, effect, state.known) for n, effect in lost.items() if n not in names}
+        tried = _tried(problem, fit, {n: effect for n, effect in lost.items() if n not in names}, state.known)
         best = min(tried, key=lambda name: float(tried[name].held_out.sum()), default="")
         if len(names) == len(state.names) + len(dropped) or not best:
             return state
@@ -326,8 +335,7 @@ def _least_share_m(predictor: Predictor, effects: _State, bare: Fit, terms: Fit)
 
 def _worth(state: _State, name: str) -> float:
     """What an effect of a state earns on held-out trials beside all else in it."""
-    lacking = state.problem.fit(state.fit.model.without(name), nearby=state.fit.jacobian_by_parameter)
-    return paired_elpd_diff(lacking.held_out, state.fit.held_out)[0]
+    return paired_elpd_diff(state.lacking([name])[name].held_out, state.fit.held_out)[0]
 
 
 def _share(bare: Fit, effects: Fit, terms: Fit) -> float:
@@ -354,10 +362,7 @@ def _pruned(predictor: Predictor, state: _State, level: float, alone: Mapping[st
     ``alone``: what each earns without terms; little beside them is then not enough (`KEPT`).
     """
     while state.names:
-        lacking = {
-            name: state.problem.fit(state.fit.model.without(name), nearby=state.fit.jacobian_by_parameter)
-            for name in state.names
-        }
+        lacking = state.lacking(state.names)
         worth = {name: state.problem.paired_comparison(one, state.fit) for name, one in lacking.items()}
         kept = {n: worth[n].elpd_diff / max(alone[n], 1e-9) if alone else worth[n].elpd_diff for n in state.names}
         least = min(kept, key=lambda name: kept[name])
