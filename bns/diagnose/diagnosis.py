@@ -74,8 +74,7 @@ class Diagnosis:
         """Without the innovations and Jacobians of what was only tried: numbers, intervals and losses of these stay."""
         if self.selection is None:
             return self
-        steps = tuple(replace(s, ranking=tuple(_slim(c) for c in s.ranking)) for s in self.selection.steps)
-        return replace(self, selection=replace(self.selection, steps=steps))
+        return replace(self, selection=replace(self.selection, steps=tuple(step.slim() for step in self.selection.steps)))
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -200,11 +199,6 @@ class Diagnosis:
             "dse": plain(comparison.dse),
             "p_value": comparison.p_value,
         }
-
-
-def _slim(candidate: Candidate) -> Candidate:
-    nothing = np.zeros((0, 3))
-    return replace(candidate, fit=replace(candidate.fit, whitened=nothing, jacobian=np.zeros((0, 3, len(candidate.fit.free)))))
 
 
 @one_thread_each()

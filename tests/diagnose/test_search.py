@@ -321,6 +321,14 @@ def test_a_curve_does_better_only_than_an_effect_that_is_not_there(unlisted, bet
         assert not curve_does_better(problem, clocks, added)
 
 
+def test_what_a_search_has_tried_is_kept_without_what_is_as_large_as_the_log(with_a_gain):
+    _, _, found = with_a_gain
+    tried = [candidate.fit for step in found.steps for candidate in step.ranking]
+    assert len(found.steps) > 1
+    assert all(fit.whitened.size == fit.jacobian.size == 0 for fit in tried)
+    assert all(len(fit.values) == len(fit.free) == fit.jacobian.shape[2] for fit in tried)
+
+
 def test_a_search_without_clocks_of_the_trials_begins_where_the_one_with_them_did(with_a_gain, monkeypatch):
     asked, select = [], StepwiseSelection._select
     monkeypatch.setattr(StepwiseSelection, "_select", lambda search: asked.append(search) or select(search))

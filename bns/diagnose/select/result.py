@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from bns.diagnose.estimate.cross_validation import held_out_steps
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.plausibility import implausible
@@ -21,6 +23,11 @@ class Candidate:
     paired_comparison: PairedComparison
     rejected_because: str = ""
 
+    def slim(self) -> Candidate:
+        """Without the innovations and the Jacobian: numbers, intervals and losses of the fit stay."""
+        nothing, jacobian = np.zeros((0, 3)), np.zeros((0, 3, len(self.fit.free)))
+        return replace(self, fit=replace(self.fit, whitened=nothing, jacobian=jacobian))
+
 
 @dataclass(frozen=True)
 class SelectionStep:
@@ -35,6 +42,10 @@ class SelectionStep:
     """Among how many effects these were chosen, where only promising ones were fitted; 0: all are in the ranking."""
     instead_of: str = ""
     """The accepted effect whose place the selected one took, if that extends another."""
+
+    def slim(self) -> SelectionStep:
+        """Without the innovations and Jacobians of what was tried."""
+        return replace(self, ranking=tuple(candidate.slim() for candidate in self.ranking))
 
 
 @dataclass(frozen=True)

@@ -152,7 +152,7 @@ class StepwiseSelection:
         while len(accepted) < MOST:
             before = problem, fit
             step, problem, fit = self._next_step(problem, fit, accepted)
-            steps.append(step)
+            steps = [*(earlier.slim() for earlier in steps), step]  # sixty fits, each as large as the log
             if not step.selected:
                 break
             self._exchanges.entry = Entry(*before, accepted, step)
@@ -206,8 +206,9 @@ class StepwiseSelection:
         if simplest is not None and len(simplest[1].free) < len(fit.free):
             competing_models = [(accepted, fit), *(r for r in competing_models if r is not simplest)]
             accepted, fit = simplest
+        rounds = (*steps[:-1], *(last.slim() for last in steps[-1:]))
         return SelectionResult(
-            problem, problem.fit(self.model), fit, accepted, tuple(steps), tuple(names for names, _ in competing_models)
+            problem, problem.fit(self.model), fit, accepted, rounds, tuple(names for names, _ in competing_models)
         )
 
     def _refit_with_noise(self, model: Model, start: Array | None = None) -> tuple[Problem, Fit]:
