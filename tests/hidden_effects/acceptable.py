@@ -26,12 +26,18 @@ LIKE = ("camera-scale", "speed-gain", "wheelbase")
 FAR_M = 8.0
 """Anchors at least so far from the arena's middle pull as a slope does, where the data is poor."""
 
+LISTED_SINCE = {"left-dead-zone": "dead-zone-mismatch", "reverse-loss": "reverse-gain"}
+"""Causes that no list held when their worlds were made, and the effects that are exactly these."""
+
 Explanation = tuple[str, ...]
 Answer = dict[str, object]
 
 
 def acceptable(world: World) -> list[Answer]:
     """All right answers to a world."""
+    since = [LISTED_SINCE.get(name, "") for name in world.unlisted]
+    if since and all(since):
+        return [_answer("effects", [tuple(sorted([*since, *world.hidden]))], [], "on the list by now")]
     if world.unlisted:
         return [{"verdict": "unlisted", "required": [], "allowed": [], "why": "no listed effect does this"}]
     required, allowed = explanations(world.hidden)

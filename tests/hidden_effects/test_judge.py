@@ -91,11 +91,18 @@ def test_a_tie_beside_another_effect_can_be_told_in_two_ways():
 
 
 def test_unlisted_and_none():
-    unlisted = World("w", "unlisted", unlisted={"reverse-loss": {"loss": 0.1}})
+    unlisted = World("w", "unlisted", unlisted={"whirl": {}})
     assert judge(unlisted, read(canned("unlisted", ["battery-sag"]))) == "right"
     assert judge(unlisted, read(canned("effects", ["battery-sag"]))) == "wrong"
     assert judge(World("w", "none"), read(canned("none"))) == "right"
     assert judge(World("w", "none"), read(canned("unlisted"))) == "wrong"
+
+
+def test_a_cause_that_is_on_the_list_by_now_is_to_be_named():
+    unlisted = World("w", "unlisted", {"wheel-mismatch": {"share": 1.01}}, unlisted={"reverse-loss": {"loss": 0.1}})
+    assert judge(unlisted, read(canned("effects", ["reverse-gain", "wheel-mismatch"]))) == "right"
+    assert judge(unlisted, read(canned("effects", ["reverse-gain"]))) == "wrong"
+    assert judge(unlisted, read(canned("unlisted", ["wheel-mismatch"]))) == "wrong"
 
 
 def test_insufficient_data_abstains_under_hard_conditions_only():
