@@ -21,6 +21,7 @@ from bns.diagnose.residuals.unexplained import Unexplained
 from bns.diagnose.residuals.worst_trials import WithoutWorst
 from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.result import Candidate, SelectionResult
+from bns.diagnose.select.variants import uncertain_variants
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import numbers_of, ties_of, without_width
 from bns.physics.effect import Effect, Parameter
@@ -83,6 +84,8 @@ def notes_on(
     yield from _on_the_cone(selection.fit.model)
     for names in longer:
         yield _on_longer(selection, names)
+    if not found.terms:
+        yield from (variant.in_words for variant in uncertain_variants(selection))
     yield from _on_rest(found.rest, tracks)
     formula, with_terms = found.formula, found.errors_with_terms
     if formula is not None and not formula.signal and formula.paired_comparison.p_value < CHANCE:
