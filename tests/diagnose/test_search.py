@@ -281,25 +281,31 @@ def test_a_sign_is_worth_more_trials_only_where_few_nearly_sufficed(change, hint
     assert (diagnosis._hint(found, given["trials"]) is candidate) is hinted
 
 
-@pytest.mark.parametrize("better", [False, True])
+@pytest.mark.parametrize("better", [(False,), (True, True, True), (True, False)])
 def test_beside_several_effects_the_search_ends_where_a_curve_does_better(monkeypatch, better):
-    """What is on no list is imitated by one effect after the other, and each is sought longer than the one before."""
+    """What is on no list is imitated by one effect after the other, and each is sought longer than the one before.
+
+    But a curve that does better than the next effect has to do better than all that would follow it, too.
+    """
     monkeypatch.setattr("bns.diagnose.select.stepwise.CURVE_FROM", 1)
     asked = []
 
     def curve_does_better(problem, fit, added):
         asked.append({f.effect for f in added.free} - {f.effect for f in fit.free})
         assert added.loss < fit.loss == pytest.approx(problem.loss(fit.model))
-        return better
+        return better[len(asked) - 1]
 
     predictor = WheelPredictor(tracks_of(measured(hidden(speed_gain={"gain": 0.96}, wheelbase={"factor": 1.08}), seed=11)))
     others = set(all_effects()) - {"speed-gain", "wheelbase", "motor-lag"}
     search = StepwiseSelection(predictor, NOMINAL, barred=others, curve_does_better=curve_does_better)
     found = search.run()
-    assert len(found.accepted) == (1 if better else 2)
-    assert [step.selected != "" for step in found.steps] == [True, *([] if better else [True]), False]
+    ends = all(better)
+    assert len(found.accepted) == (1 if ends else 2)
+    assert [step.selected != "" for step in found.steps] == [True, *([] if ends else [True]), False]
     assert asked[0] == {"speed-gain", "wheelbase"} - set(found.accepted[:1])
-    if better:
+    assert len(asked) == len(better[:2])
+    if ends:
+        better = (True,) * 9
         assert len(found.steps[-1].ranking) == 2
         again = search.stands(found)
         assert again is not None
@@ -350,3 +356,14 @@ def test_a_bold_search_is_another_one(with_a_gain):
     search._all_believed = True
     assert search._run() is not found
     assert search._plain is found
+
+
+def test_a_search_looks_ahead_to_all_effects_that_would_come_in():
+    """Three that are there; a fourth that is not is left out."""
+    true = hidden(speed_gain={"gain": 0.95}, wheelbase={"factor": 1.08}, motor_lag={"tau_s": 0.15})
+    predictor = WheelPredictor(tracks_of(measured(true, seed=11)))
+    others = set(all_effects()) - {"speed-gain", "wheelbase", "motor-lag", "camera-rotation"}
+    search = StepwiseSelection(predictor, NOMINAL, barred=others)
+    problem, fit = search._refit_with_noise(NOMINAL.with_effect("speed-gain", gain=0.95))
+    ahead = search._looked_ahead(problem, fit, ("speed-gain",))
+    assert {active.effect.name for active in ahead.effects} == {"speed-gain", "wheelbase", "motor-lag"}

@@ -216,7 +216,10 @@ class StepwiseSelection:
         return settled_problem(self.predictor, model, start)
 
     def _next_step(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> tuple[SelectionStep, Problem, Fit]:
-        """A step forwards; none beside several effects where a curve does better: the list lacks what is missing."""
+        """A step forwards; none beside several effects where a curve does better than it, and than all that could follow it.
+
+        The list lacks what is missing then. Of several effects the next one alone may do less than a curve.
+        """
         forwards = self._forward_step(problem, fit, accepted)
         step = forwards[0]
         if not step.selected or len(accepted) < CURVE_FROM:
@@ -224,7 +227,22 @@ class StepwiseSelection:
         added = next(c.fit for c in step.ranking if c.name == step.selected)
         if not self._curve_does_better(problem, fit, added):
             return forwards
+        there = (*(name for name in accepted if name != step.instead_of), step.selected)
+        ahead = problem.fit(self._looked_ahead(*forwards[1:], there))
+        if not self._curve_does_better(problem, fit, ahead):
+            return forwards
         return replace(step, selected="", instead_of=""), problem, fit
+
+    def _looked_ahead(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> Model:
+        """With as many effects as a search accepts, one after the other; none is exchanged, and none extends another."""
+        while len(accepted) < MOST:
+            tried = each(partial(self._tried, problem, fit, {}), [*DECOYS, *self._worth_a_fit(problem, fit, accepted)])
+            decoy_threshold = max(c.paired_comparison.elpd_diff for c in tried[: len(DECOYS)])
+            step, problem, fit = self._chosen(problem, fit, tried[len(DECOYS) :], decoy_threshold, {}, 0)
+            if not step.selected:
+                break
+            accepted = (*accepted, step.selected)
+        return fit.model
 
     def _forward_step(
         self, problem: Problem, fit: Fit, accepted: tuple[str, ...]
