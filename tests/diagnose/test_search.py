@@ -312,19 +312,22 @@ def test_beside_several_effects_the_search_ends_where_a_curve_does_better(monkey
         assert again.accepted == found.accepted
 
 
-@pytest.mark.parametrize(("unlisted", "better"), [(False, False), (True, True)])
-def test_a_curve_does_better_only_than_an_effect_that_is_not_there(unlisted, better):
-    true = hidden(wheelbase={"factor": 1.05})
+@pytest.mark.parametrize("names", [("wheelbase",), ("wheelbase", "motor-lag"), ("wheelbase", "motor-lag", "side-slip")])
+@pytest.mark.parametrize("unlisted", [False, True])
+def test_curves_do_better_only_than_effects_that_are_not_there(unlisted, names):
+    true = hidden(wheelbase={"factor": 1.05}, motor_lag={"tau_s": 0.15}, side_slip={"slip_s": 0.1})
     if unlisted:
         true = NOMINAL.with_active(formula_effect("rough", "k * exp(-tau / 2)", "share"), (-0.15,))
     predictor = WheelPredictor(tracks_of(measured(true, trials=20, seed=11)))
-    problem = problem_for(predictor, NOMINAL)
-    fit = problem.fit(NOMINAL)
-    added = fit_with(problem, fit, listed(NOMINAL, None, predictor.tracks)["wheelbase"])
-    assert curve_does_better(problem, fit, added) is better
-    if unlisted:
-        clocks = SimpleNamespace(model=SimpleNamespace(per_trial_effect="clock-offset"))
-        assert not curve_does_better(problem, clocks, added)
+    left = [active for active in true.effects if active.effect.name not in names and not unlisted]
+    model = replace(NOMINAL, effects=tuple(left))  # what is there beside the effects that are asked about
+    problem = problem_for(predictor, model)
+    fit = added = problem.fit(model)
+    for name in names:
+        added = fit_with(problem, added, listed(NOMINAL, None, predictor.tracks)[name])
+    assert curve_does_better(problem, fit, added) is unlisted
+    clocks = SimpleNamespace(model=SimpleNamespace(per_trial_effect="clock-offset"))
+    assert not curve_does_better(problem, clocks, added)
 
 
 def test_what_a_search_has_tried_is_kept_without_what_is_as_large_as_the_log(with_a_gain):

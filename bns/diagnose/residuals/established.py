@@ -131,14 +131,24 @@ def left_over(problem: Problem, fit: Fit, response: bool = True) -> bool:
 
 
 def curve_does_better(problem: Problem, fit: Fit, added: Fit) -> bool:
-    """Does a flexible term that earns its place predict better for certain than one more effect, ``added``, does?
+    """Do flexible terms that earn their place predict better for certain than further effects, ``added``, do?
 
-    Not asked where no terms are looked for: bodies on joints, single relative motions, trials with clocks of their own.
+    As many terms as effects, at most `TERMS`. Not asked where no terms are looked for: bodies on joints, single relative motions,
+    trials with clocks of their own.
     """
     if problem.predictor.tracks.relative or fit.model.per_trial_effect is not None:
         return False
     grammar = families(problem.predictor, fit.model.wheelbase_m, False)
-    return _better_term(problem, fit, _curves(problem, fit, grammar, ()), added, FALSE_ALARM / max(len(grammar), 1)) is not None
+    level, state = FALSE_ALARM / max(len(grammar), 1), _State(problem, fit)
+    effects = len(added.model.effects) - len(fit.model.effects)
+    if effects == 1:
+        return _better_term(problem, fit, _curves(problem, fit, grammar, ()), added, level) is not None
+    for _ in range(min(effects, TERMS)):
+        term = _better_term(problem, state.fit, _curves(problem, state.fit, grammar, state.terms), None, level)
+        if term is None:
+            break
+        state = replace(state, fit=term.fit, terms=(*state.terms, term))
+    return _certainly_better(*paired_elpd_diff(added.held_out, state.fit.held_out), fit)
 
 
 def _better_term(
@@ -201,7 +211,10 @@ def _whole(term: Formula) -> bool:
 
 
 def _clearly_better(curve: Earned, effect: Fit, fit: Fit) -> bool:
-    gain, se = paired_elpd_diff(effect.held_out, curve.losses)
+    return _certainly_better(*paired_elpd_diff(effect.held_out, curve.losses), fit)
+
+
+def _certainly_better(gain: float, se: float, fit: Fit) -> bool:
     share = gain / float(fit.held_out.mean())
     return share > CLEARLY and certain(PairedComparison(gain, se, 0.0), share)
 
