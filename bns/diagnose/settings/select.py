@@ -86,10 +86,10 @@ class Select:
     curve_from: int = setting(
         3,
         "effects",
-        "Beside so many accepted effects the search ends where a flexible term predicts clearly better than the next effect, and "
-        "than all that would follow it: what is missing is not in the catalogue. In 96 worlds with up to three effects and nine "
-        "logs of real robots no search was ended; of ten worlds with four or five, two would have been ended by the next effect "
-        "alone.",
+        "Beside so many accepted effects the search ends where a flexible term predicts clearly better than the next effect, "
+        "and as many terms better than all effects that would follow: what is missing is not in the catalogue. In 96 worlds "
+        "with up to three effects and nine logs of real robots no search was ended. Of nine worlds with four or five, the "
+        "first condition alone would have ended two wrongly; the second prevents it.",
     )
     most_effects: int = setting(
         6,
