@@ -84,8 +84,7 @@ def notes_on(
     yield from _on_the_cone(selection.fit.model)
     for names in longer:
         yield _on_longer(selection, names)
-    if not found.terms:
-        yield from (variant.in_words for variant in uncertain_variants(selection))
+    yield from _on_place(found)
     yield from _on_rest(found.rest, tracks)
     formula, with_terms = found.formula, found.errors_with_terms
     if formula is not None and not formula.signal and formula.paired_comparison.p_value < CHANCE:
@@ -233,6 +232,12 @@ def _on_longer(selection: SelectionResult, names: Sequence[str]) -> str:
     numbers = "as many numbers" if gained == lost else "fewer numbers" if gained < lost else ""
     more = f"one more effect and {numbers}" if numbers else "one more effect"
     return f"{' with '.join(come)} in the place of {' with '.join(gone)} would explain as much, with {more}."
+
+
+def _on_place(found: Outcome) -> Iterator[str]:
+    """On effects that could act at another place in the chain; not with terms, which change the numbers."""
+    if not found.terms:
+        yield from (variant.in_words for variant in uncertain_variants(found.selection))
 
 
 def _on_effects(selection: SelectionResult, tracks: Tracks, imitating: Sequence[str] = ()) -> Iterator[str]:

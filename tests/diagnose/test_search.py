@@ -323,7 +323,7 @@ def test_curves_do_better_only_than_effects_that_are_not_there(monkeypatch, unli
         true = NOMINAL.with_active(formula_effect("rough", "k * exp(-tau / 2)", "share"), (-0.15,))
     predictor = WheelPredictor(tracks_of(measured(true, trials=20, seed=11)))
     left = [active for active in true.effects if active.effect.name not in names and not unlisted]
-    model = replace(NOMINAL, effects=tuple(left))  # what is there beside the effects that are asked about
+    model = replace(NOMINAL, effects=tuple(left))  # with what is there, but for the effects that are asked about
     problem = problem_for(predictor, model)
     fit = added = problem.fit(model)
     for name in names:
@@ -364,6 +364,28 @@ def test_a_bold_search_is_another_one(with_a_gain):
     search._all_believed = True
     assert search._run() is not found
     assert search._plain is found
+
+
+SEVERAL = {
+    "camera_scale": {"factor": 1.03}, "dead_zone": {"width_m_s": 0.008},
+    "marker_offset": {"forward_m": 0.008, "left_m": -0.006}, "motor_lag": {"tau_s": 0.12}, "speed_limit": {"max_m_s": 0.15},
+    "turn_slip": {"slip_s": 0.05}, "wheel_mismatch": {"ratio": 0.97},
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("seed", "names"),
+    [
+        (3, ("camera_scale", "dead_zone", "turn_slip", "wheel_mismatch")),
+        (12, ("camera_scale", "marker_offset", "motor_lag", "speed_limit", "turn_slip")),
+    ],
+)
+def test_a_curve_that_does_better_than_the_next_effect_does_not_hide_several(seed, names):
+    """Beside three effects, one of which is wrong or another of which is missing, a curve does better than the fourth alone."""
+    true = hidden(**{name: SEVERAL[name] for name in names}).arranged()
+    found = diagnosed(true, trials=40, seed=seed)
+    assert (found.verdict, set(found.effects)) == ("effects", {name.replace("_", "-") for name in names})
 
 
 def test_a_search_looks_ahead_to_all_effects_that_would_come_in():

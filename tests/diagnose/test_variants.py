@@ -1,7 +1,10 @@
 """An accepted effect that could act at another place in the chain comes with what speaks for the place that was chosen."""
 
+from types import SimpleNamespace
+
 import pytest
 
+from bns.diagnose import caveats
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.problem import problem_for
@@ -58,3 +61,11 @@ def test_a_diagnosis_says_so():
     found = diagnose(predictor, NOMINAL, barred=others)
     assert sorted(found.effects) == ["dead-zone", "wheel-mismatch"]
     assert any("wheel-diameters has the same parameters as wheel-mismatch" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(("terms", "said"), [((), 1), (("unlisted",), 0)])
+def test_with_terms_which_change_the_numbers_it_is_not_said(monkeypatch, terms, said):
+    asked = []
+    monkeypatch.setattr(caveats, "uncertain_variants", lambda selection: asked.append(selection) or [])
+    assert list(caveats._on_place(SimpleNamespace(selection=None, terms=terms))) == []
+    assert len(asked) == said

@@ -133,15 +133,15 @@ def left_over(problem: Problem, fit: Fit, response: bool = True) -> bool:
 def curve_does_better(problem: Problem, fit: Fit, added: Fit) -> bool:
     """Do flexible terms that earn their place predict better for certain than further effects, ``added``, do?
 
-    As many terms as effects, at most `TERMS`. Not asked where no terms are looked for: bodies on joints, single relative motions,
-    trials with clocks of their own.
+    As many terms as effects, at most `TERMS`; none against an effect that took another's place. Not asked where no terms are
+    looked for: bodies on joints, single relative motions, trials with clocks of their own.
     """
     if problem.predictor.tracks.relative or fit.model.per_trial_effect is not None:
         return False
     grammar = families(problem.predictor, fit.model.wheelbase_m, False)
     level, state = FALSE_ALARM / max(len(grammar), 1), _State(problem, fit)
     effects = len(added.model.effects) - len(fit.model.effects)
-    if effects == 1:
+    if effects == 1:  # most curves are not clearly better already as they are estimated, and need not be fitted
         return _better_term(problem, fit, _curves(problem, fit, grammar, ()), added, level) is not None
     for _ in range(min(effects, TERMS)):
         term = _better_term(problem, state.fit, _curves(problem, state.fit, grammar, state.terms), None, level)

@@ -91,10 +91,12 @@ class StepwiseSelection:
 
     def _run(self, before: SelectionResult | None = None) -> SelectionResult:
         """The search; again with a clock for each trial where these differ, since that hides what else is wrong."""
-        known = self.stands(before) if before else None if self._all_believed else self._plain
-        plain = known or self._select()
-        if not (before or self._all_believed):
-            self._plain = plain
+        if before:
+            plain = self.stands(before) or self._select()
+        elif self._all_believed:
+            plain = self._select()
+        else:
+            plain = self._plain = self._plain or self._select()
         clocks = fit_trial_clocks(plain.problem, plain.fit) if self._own_clocks else None
         if clocks is None or _per_trial_effect(clocks.fit.model) in self._barred:
             return plain
@@ -236,9 +238,8 @@ class StepwiseSelection:
     def _looked_ahead(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> Model:
         """With as many effects as a search accepts, one after the other; none is exchanged, and none extends another."""
         while len(accepted) < MOST:
-            tried = each(partial(self._tried, problem, fit, {}), [*DECOYS, *self._worth_a_fit(problem, fit, accepted)])
-            decoy_threshold = max(c.paired_comparison.elpd_diff for c in tried[: len(DECOYS)])
-            step, problem, fit = self._chosen(problem, fit, tried[len(DECOYS) :], decoy_threshold, {}, 0)
+            tried, decoy_threshold = self._with_decoys(problem, fit, self._worth_a_fit(problem, fit, accepted), {})
+            step, problem, fit = self._chosen(problem, fit, tried, decoy_threshold, {}, 0)
             if not step.selected:
                 break
             accepted = (*accepted, step.selected)
@@ -253,10 +254,9 @@ class StepwiseSelection:
         """
         left = self._worth_a_fit(problem, fit, accepted)
         place = to_extend(self._worth.values(), fit, accepted, lambda: self._exchanges.of(problem, fit, accepted))
-        tried = each(partial(self._tried, problem, fit, place), [*DECOYS, *left, *(self._worth[name] for name in place)])
-        decoy_threshold = max(c.paired_comparison.elpd_diff for c in tried[: len(DECOYS)])
+        tried, decoy_threshold = self._with_decoys(problem, fit, [*left, *(self._worth[name] for name in place)], place)
         of = len(self.catalogue) - len(accepted) if self.predictor.screening is not None else 0
-        chosen = self._chosen(problem, fit, tried[len(DECOYS) :], decoy_threshold, place, of)
+        chosen = self._chosen(problem, fit, tried, decoy_threshold, place, of)
         lone = [effect for effect in self._worth.values() if effect.extends and effect.name not in (*accepted, *place)]
         if chosen[0].selected or not lone:
             return chosen
@@ -265,6 +265,13 @@ class StepwiseSelection:
         ranking = sorted((*first.ranking, *step.ranking), key=lambda c: -c.paired_comparison.elpd_diff)
         passed_over = step.passed_over or first.passed_over
         return replace(step, ranking=tuple(ranking), passed_over=passed_over), problem, fit
+
+    def _with_decoys(
+        self, problem: Problem, fit: Fit, effects: Sequence[Effect], place: Mapping[str, tuple[str, Fit]]
+    ) -> tuple[list[Candidate], float]:
+        """The effects as candidates, and what the best of the decoys gains."""
+        tried = each(partial(self._tried, problem, fit, place), [*DECOYS, *effects])
+        return tried[len(DECOYS) :], max(c.paired_comparison.elpd_diff for c in tried[: len(DECOYS)])
 
     def _chosen(
         self,

@@ -86,7 +86,7 @@ class Select:
     curve_from: int = setting(
         3,
         "effects",
-        "Beside so many accepted effects the search ends where a flexible term predicts clearly better than the next effect, "
+        "Once so many effects are accepted, the search ends where a flexible term predicts clearly better than the next one, "
         "and as many terms better than all effects that would follow: what is missing is not in the catalogue. In 96 worlds "
         "with up to three effects and nine logs of real robots no search was ended. Of nine worlds with four or five, the "
         "first condition alone would have ended two wrongly; the second prevents it.",
