@@ -51,8 +51,8 @@ def say_if_experimental(device: str) -> None:
     """A line on stderr after work on a GPU."""
     if device != "cpu":
         print(
-            f"bns: note: --device {device} is experimental: compared with the CPU on an NVIDIA H100 alone. Before you rely "
-            "on another GPU, compare some of its results",
+            f"bns: note: --device {device} is experimental: compared on an NVIDIA H100 and an H200 alone. Before you rely on "
+            "another GPU, compare some of its results with the CPU's",
             file=sys.stderr,
         )
 
