@@ -57,10 +57,10 @@ def shipped_rig(robot: str) -> Rig:
     return parse_rig(PLATFORMS.load(robot).RIG.read_text(encoding="utf-8"), f"the shipped rig of {robot}")
 
 
-def load_rig(path: Path, robot: str) -> Rig:
-    """A rig from a file; HardwareError names what is wrong, or that it is another robot's."""
+def load_rig(path: Path, robot: str | None = None) -> Rig:
+    """A rig from a file, of any robot or of this one; HardwareError names what is wrong, or that it is another robot's."""
     rig = parse_rig(text_of(path, "the rig", HardwareError), str(path))
-    if rig.robot != robot:
+    if robot not in (None, rig.robot):
         raise HardwareError(f"{path} is a rig for {rig.robot}, and the trial is for {robot}; name the other with --robot.")
     return rig
 

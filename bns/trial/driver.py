@@ -222,16 +222,14 @@ class TrialDriver:
     def _ready(self, void: int) -> None:
         """See that the robot stands near enough to its start."""
         began = time.perf_counter()
-        for _ in range(_MOST_VOID):
-            why = self._misplaced(void)
-            if why is None:
-                break
+        requests = 0
+        while (why := self._misplaced(void)) is not None:
+            if requests == _MOST_VOID:
+                raise TrialPausedError(f"the robot could not be brought to its start: {why}")
             self._log.note("placing", why=why)
             with self.suspended():
                 self._operator.place(self.start, why)
-            void, self._first = 0, False
-        else:
-            raise TrialPausedError(f"the robot could not be brought to its start: {self._misplaced(0)}")
+            requests, void, self._first = requests + 1, 0, False
         self.placing_s += time.perf_counter() - began
 
     def _misplaced(self, void: int) -> str | None:

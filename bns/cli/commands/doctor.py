@@ -12,7 +12,8 @@ from bns.registry import PLATFORMS
 
 def checked_up(options: argparse.Namespace) -> int:
     """Print the findings; 0 if all is fine, else 2."""
-    PLATFORMS.part(options.robot)  # there is no robot without: a misspelled name must not be "all fine"
+    if options.robot is not None:
+        PLATFORMS.part(options.robot)  # there is no robot without: a misspelled name must not be "all fine"
     rig = None if options.rig is None else load_rig(options.rig, options.robot)
     bad = 0
     for finding in examine(rig, RealClock()):

@@ -102,7 +102,9 @@ class Guard:
         elif state:
             self._trip(f"the trial's process {state}")
         elif now_s - self._beat_s > self._setup["silent_s"]:
-            self._trip(f"the trial gave no sign of life for {now_s - self._beat_s:.2f} s")
+            allowed_s = self._setup["silent_s"]
+            silent_s = now_s - self._beat_s
+            self._trip(f"the trial gave no sign of life for {silent_s:.2f} s (the rig's silent_s allows {allowed_s:g} s)")
 
     def _trip(self, why: str) -> None:
         if not self.why:

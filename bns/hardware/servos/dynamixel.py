@@ -63,7 +63,7 @@ class DynamixelChain:
             wrong = self._all_that_is_wrong() if self._port.echoes else wrong
         if wrong:
             self.close()
-            raise HardwareError("; ".join(wrong) + ". Check cables, power and ids (bns doctor lists who answers).")
+            raise HardwareError("; ".join(wrong) + ". Check cables, power and ids (bns servos scan lists who answers).")
 
     def _all_that_is_wrong(self) -> list[str]:
         return [text for number in self.ids if (text := self._what_is_wrong(number))]
@@ -119,6 +119,7 @@ class DynamixelChain:
             try:
                 self._reopen()
                 data, result, bits = call()
+                result = COMM_RX_CORRUPT if self._port.heard_itself else result
             except IndexError:  # the SDK reads past the end of a status packet that is too short
                 data, result, bits = b"", COMM_RX_CORRUPT, 0
                 problem = "corrupt status packet"

@@ -20,6 +20,8 @@ _SLICE_S = 0.002
 _BITS_A_BYTE = 10.0
 _ECHO_S = 0.04
 """An adapter that echoes has done so by then: twice the 16 ms for which slow ones hold bytes back, and a little."""
+_HELD_S = 0.25
+"""An echo that did not come in time may still come for so long: a busy USB hub or computer holds bytes up."""
 _LATE_S = 0.02
 """An answer may still come for so long after it was given up, by the SDK after 34 ms and more."""
 _SHORTEST_2 = 9
@@ -50,8 +52,10 @@ class ClockedPort(PortHandler):
     def __init__(self, port: str, clock: Clock) -> None:
         super().__init__(port)
         self._clock, self.echoes = clock, False
-        self._asked, self._heard = Asked(-1, False), b""
+        self._asked, self._sent, self._heard = Asked(-1, False), b"", b""
         self._owes, self._late_until_s = -1, 0.0
+        self._held: bytes = b""
+        """The packet that was given up before its echo was complete: both may still come, and look like answers."""
         self._silent: Callable[[], bool] = lambda: False
         self._late: Callable[[], bool] = lambda: False
 
@@ -80,7 +84,7 @@ class ClockedPort(PortHandler):
 
         A servo whose answer was given up is asked again only when that cannot come any more: it would be taken for the new one.
         """
-        self._asked = _asked(packet)
+        self._asked, self._sent = _asked(packet), bytes(packet)
         if self._asked.number == self._owes and self._clock.now_s() < self._late_until_s:
             self._clock.sleep(self._late_until_s - self._clock.now_s())
             self.clearPort()
@@ -96,6 +100,11 @@ class ClockedPort(PortHandler):
         self._heard += data
         return data
 
+    @property
+    def heard_itself(self) -> bool:
+        """Whether the answer that was taken last is a held-up echo. The answer to a ping may have the same bytes."""
+        return self.echoes and not self._asked.ping and self._heard.endswith(self._sent)
+
     def took(self, protocol: int, number: int, size: int) -> bool:
         """Whether the answer that was taken last has so many bytes of data. The SDK does not look: a late one to another question
         passes for an answer, its checksum for data."""
@@ -107,13 +116,21 @@ class ClockedPort(PortHandler):
         return packet is not None and packet.number == number and len(packet.parameters) == size + 1
 
     def _written(self, packet: Sequence[int]) -> tuple[int, bool]:
-        """How much of it, and whether it came back."""
-        in_vain = self._clock.in_vain(_ECHO_S)
+        """How much of it, and whether it came back.
+
+        Of a packet that is sent again because its echo was held up, two come: the second is this one's. If only one comes, the
+        other was lost.
+        """
+        sent = bytes(packet)
+        copies, wait_s = (2, _HELD_S) if sent == self._held else (1, _HELD_S if self._held else _ECHO_S)
+        in_vain = self._clock.in_vain(wait_s)
         written, found = super().writePort(packet), b""
-        while not (came := found.endswith(bytes(packet))) and not in_vain():
-            found += self.ser.read(max(1, len(packet) - len(found)))  # more only where a late answer comes first
-        if not came:
-            self._clock.waited(_ECHO_S)
+        while not (whole := found.endswith(sent) and found.count(sent) >= copies) and not in_vain():
+            found += self.ser.read(max(1, len(sent) - len(found)))  # more only where a late answer comes first
+        if not whole:
+            self._clock.waited(wait_s)
+        came = sent in found
+        self._held = b"" if came or len(found) >= len(sent) else sent
         return written, came
 
     def more_comes(self) -> bool:
@@ -128,6 +145,8 @@ class ClockedPort(PortHandler):
 
     def clearPort(self) -> None:  # noqa: N802  # the SDK's name
         """Throw away what came too late; the SDK's own only waits until everything is sent."""
+        if self._held and self._held in self.ser.read(self.ser.in_waiting):
+            self._held = b""
         self.ser.reset_input_buffer()
         self._heard = b""
         self._silent = self._clock.in_vain(math.inf)  # from before the question on: an answer can be quick

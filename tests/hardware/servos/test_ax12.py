@@ -208,7 +208,7 @@ def test_opening_finds_every_servo(chain):
 @pytest.mark.parametrize(
     ("build", "message"),
     [
-        ({"asked": (1, 2, 3, 4)}, r"servo 4 is missing .*bns doctor"),
+        ({"asked": (1, 2, 3, 4)}, r"servo 4 is missing .*bns servos scan"),
         ({"numbers": (1, 2, 2, 3)}, r"servo 2: answers are garbled; two servos may have this id|servo 2 is missing"),
         ({"model_number": 18}, r"servo 1 is of the model AX-18, not AX-12"),
     ],

@@ -6,6 +6,7 @@ import pytest
 
 from bns.cli.main import main
 from bns.hardware.doctor import cameras, examine, latency_of, may_use, ports, remotes
+from bns.hardware.platforms.snake import RIG as RIG_OF_THE_SNAKE
 from bns.hardware.rig import load_rig
 
 RIG = """robot: khepera
@@ -27,6 +28,15 @@ def test_what_is_missing_is_named_with_the_next_step(tmp_path, capsys):
     assert "BAD  the robot: there is no port /dev/nowhere" in said
     assert "BAD  the tracker: cannot open the Wii remote" in said
     assert "to be fixed" in said
+
+
+def test_the_robot_is_the_one_that_the_rig_names(tmp_path, capsys):
+    text = RIG_OF_THE_SNAKE.read_text(encoding="utf-8").replace("/dev/ttyUSB0", "/dev/nowhere")
+    (tmp_path / "snake.yaml").write_text(text, encoding="utf-8")
+    assert main(["doctor", "--rig", str(tmp_path / "snake.yaml")]) == 2
+    assert "BAD  the robot: there is no port /dev/nowhere" in capsys.readouterr().out
+    assert main(["doctor", "--robot", "khepera", "--rig", str(tmp_path / "snake.yaml")]) == 2
+    assert "is a rig for snake" in capsys.readouterr().err
 
 
 def findings(tmp_path, bench, volts):
