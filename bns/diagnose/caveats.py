@@ -21,7 +21,7 @@ from bns.diagnose.residuals.unexplained import Unexplained
 from bns.diagnose.residuals.worst_trials import WithoutWorst
 from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.result import Candidate, SelectionResult
-from bns.diagnose.select.variants import uncertain_variants
+from bns.diagnose.select.variants import order_of_friction, uncertain_variants
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import numbers_of, ties_of, without_width
 from bns.physics.effect import Effect, Parameter
@@ -238,6 +238,9 @@ def _on_place(found: Outcome) -> Iterator[str]:
     """On effects that could act at another place in the chain; not with terms, which change the numbers."""
     if not found.terms:
         yield from (variant.in_words for variant in uncertain_variants(found.selection))
+        order = order_of_friction(found.selection)
+        if order:
+            yield order
 
 
 def _on_effects(selection: SelectionResult, tracks: Tracks, imitating: Sequence[str] = ()) -> Iterator[str]:

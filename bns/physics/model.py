@@ -18,6 +18,7 @@ from bns.physics.effect import Effect, number
 from bns.physics.effects import all_effects, chain_key, effect_named, effect_names
 from bns.physics.formula import formula_effect
 from bns.physics.model_checks import flag, interval, join, keys, why
+from bns.physics.order import RAMPS, is_friction_last
 from bns.physics.trust import trusted_effect
 from bns.safe_yaml import Lines, read_yaml, shown, text_of
 
@@ -89,6 +90,9 @@ class Model:
     provenance: Mapping[str, Any] = field(default_factory=dict)
     """How the model came to be: data and their hash, date, error before and after; free text for people."""
 
+    friction_last: bool = field(default=True, compare=False, repr=False)
+    """Of a model without friction or without ramps: whether friction acts behind ramps once both are there."""
+
     bases: ClassVar[tuple[str, ...]] = BASES
     """What its ``base`` may be."""
 
@@ -145,7 +149,7 @@ class Model:
         simpler = next((a for a in self.effects if a.effect.name in parts), None)
         others = tuple(a for a in self.effects if a is not old and a is not simpler)
         active = ActiveEffect(effect, values, replaces=simpler if old is None else old.replaces)
-        return replace(self, effects=(*others, active)).arranged()
+        return self._in_order((*others, active), self.is_friction_last)
 
     def with_effect(self, name: str, basis: str = "guess", reason: str = "", **values: float) -> Model:
         """The model with that effect switched on at these values; in its old place, else last."""
@@ -177,22 +181,45 @@ class Model:
         )
         return replace(self, effects=changed)
 
+    @property
+    def is_friction_last(self) -> bool:
+        """Whether friction acts behind ramps (`bns.physics.order`): by the order of the effects, where both are there."""
+        found = is_friction_last([active.effect.name for active in self.effects])
+        return self.friction_last if found is None else found
+
     def arranged(self) -> Model:
         """The model with its effects in the order in which they act; those of packages that share a place, by name."""
-        return replace(self, effects=tuple(sorted(self.effects, key=lambda a: chain_key(a.effect))))
+        return self._in_order(self.effects, self.is_friction_last)
+
+    def with_friction_moved(self) -> Model | None:
+        """The model with friction on the other side of its ramps; None where one of the two is not there."""
+        if is_friction_last([active.effect.name for active in self.effects]) is None:
+            return None
+        return self._in_order(self.effects, not self.is_friction_last)
+
+    def _in_order(self, effects: Iterable[ActiveEffect], friction_last: bool) -> Model:
+        effects = tuple(effects)
+        behind = friction_last and any(active.effect.name in RAMPS for active in effects)
+        arranged = tuple(sorted(effects, key=lambda a: chain_key(a.effect, behind)))
+        return replace(self, effects=arranged, friction_last=friction_last)
+
+    def key_of(self, effect: Effect) -> tuple[float, str]:
+        """Where an effect acts, or would act, beside those of the model (`chain_key`)."""
+        return chain_key(effect, self.is_friction_last and any(active.effect.name in RAMPS for active in self.effects))
 
     def without(self, name: str) -> Model:
         """The model with that effect switched off; with the simpler one again whose place it took."""
         if all(a.effect.name != name for a in self.effects):
             self.effect_named(name)
-        rest = replace(self, effects=tuple(a for a in self.effects if a.effect.name != name))
+        kept = tuple(a for a in self.effects if a.effect.name != name)
+        rest = replace(self, effects=kept, friction_last=self.is_friction_last)
         back = next((a.replaces for a in self.effects if a.effect.name == name), None)
         if back is None:
             return rest
         name = back.effect.name
         heir = next((a for a in rest.effects if name in (a.effect.extends, *a.effect.contains) and not a.replaces), None)
         if heir is None:
-            return replace(rest, effects=(*rest.effects, back)).arranged()
+            return rest._in_order((*rest.effects, back), self.is_friction_last)  # a model of this class
         return replace(rest, effects=tuple(replace(a, replaces=back) if a is heir else a for a in rest.effects))
 
     def canonical_json(self) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 OTHERS, DECOYS, FORMULAS = "others", "decoys", "formulas"
 """Places for effects that are not in the catalogue: those of users, decoys, formulas."""
 
@@ -76,6 +78,27 @@ ORDER = (
 """Stages come first (wheel, body, world, clock, measure); this is the order of effects that are put together by the machine."""
 
 
-def place(name: str, after: str) -> float:
-    """The place of an effect in the chain: its own in `ORDER`, or right after ``after``."""
+FRICTION = ("dead-zone", "dead-zone-mismatch", "friction-warm-up", "stribeck", "dead-band", "breakaway")
+"""What a wheel loses at a steady speed, or stands still for. It acts before `RAMPS` or behind all of them.
+
+The order shows: behind a ramp a wheel stands until the ramp has reached what friction takes, and it stops earlier. A ramp of
+commands (a speed profile) has friction behind it; firmware that ramps what it has reduced already has it before.
+"""
+RAMPS = ("acceleration-limit", "force-limit", "braking-limit", "velocity-ramp", "braking-ramp")
+
+
+def place(name: str, after: str, friction_last: bool = False) -> float:
+    """The place of an effect in the chain: its own in `ORDER`, or right after ``after``.
+
+    ``friction_last``: friction acts behind ramps.
+    """
+    if friction_last and name in FRICTION:
+        return ORDER.index(RAMPS[-1]) + (1 + FRICTION.index(name)) / (1 + len(FRICTION)) / 2
     return float(ORDER.index(name)) if name in ORDER else ORDER.index(after) + 0.5
+
+
+def is_friction_last(names: Sequence[str]) -> bool | None:
+    """Whether friction comes behind ramps among names in the order in which they act; None where one of the two is not there."""
+    friction = next((at for at, name in enumerate(names) if name in FRICTION), None)
+    ramp = next((at for at, name in enumerate(names) if name in RAMPS), None)
+    return None if friction is None or ramp is None else friction > ramp

@@ -67,5 +67,6 @@ def test_a_diagnosis_says_so():
 def test_with_terms_which_change_the_numbers_it_is_not_said(monkeypatch, terms, said):
     asked = []
     monkeypatch.setattr(caveats, "uncertain_variants", lambda selection: asked.append(selection) or [])
+    monkeypatch.setattr(caveats, "order_of_friction", lambda selection: "")
     assert list(caveats._on_place(SimpleNamespace(selection=None, terms=terms))) == []
     assert len(asked) == said

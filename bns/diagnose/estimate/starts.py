@@ -17,6 +17,7 @@ from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect, Parameter
 from bns.physics.model import Model
+from bns.physics.order import FRICTION, RAMPS
 
 _SHARES = DEFAULTS.estimate.start_shares
 NOTHING = DEFAULTS.estimate.start_nothing
@@ -67,7 +68,14 @@ def fit_with(problem: Problem, base: Fit, effect: Effect, known: Model | None = 
     start = best_start(problem, base, effect, known)
     hoped = min(start.loss, start.promised) if problem.predictor.screening is None else start.loss
     hopeless = base.loss - hoped < NOTHING * base.loss / len(base.losses)
-    return problem.fit(start.model, 0 if hopeless else None, start.jacobian_by_parameter)
+    return on_either_side(problem, problem.fit(start.model, 0 if hopeless else None, start.jacobian_by_parameter), effect)
+
+
+def on_either_side(problem: Problem, fit: Fit, effect: Effect) -> Fit:
+    """The fit, or that with friction on the other side of the ramps where this is better: asked when one of the two came in."""
+    moved = fit.model.with_friction_moved() if effect.name in {*FRICTION, *RAMPS} else None
+    other = fit if moved is None else problem.fit(moved)
+    return other if other.loss < fit.loss else fit
 
 
 def fit_extended(problem: Problem, base: Fit, effect: Effect, given: bool = False) -> Fit:
@@ -88,7 +96,7 @@ def fit_extended(problem: Problem, base: Fit, effect: Effect, given: bool = Fals
     bare = base.model if given else base.model.without(gone)
     more = _starts(effect, problem.predictor, bare) if jagged else ()
     models = [bare.with_active(effect, values) for values in (*starts, *more)]
-    fit = problem.fit(min(models, key=problem.loss))
+    fit = on_either_side(problem, problem.fit(min(models, key=problem.loss)), effect)
     return _from_lower_places(problem, fit) if jagged else fit
 
 

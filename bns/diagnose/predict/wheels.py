@@ -19,7 +19,6 @@ from bns.diagnose.predict.pictures import pictured, undone
 from bns.diagnose.settings import DEFAULTS
 from bns.engine.pose_filter import displacements, followed
 from bns.physics.effect import Effect
-from bns.physics.effects import chain_key
 from bns.physics.model import ActiveEffect, Model
 from bns.physics.signals import Body, Conditions, Logged, View, Wheels
 from bns.physics.wheels.differential_drive import taken_at
@@ -157,7 +156,7 @@ class WheelPredictor:
         """
         chain = _chain(model, ("wheel",))
         if effect.stage == "wheel":
-            chain = tuple(one for one in chain if chain_key(one[0]) < chain_key(effect))
+            chain = tuple(one for one in chain if model.key_of(one[0]) < model.key_of(effect))
         known = effect.name, model.wheelbase_m, chain
         if known not in self._starts and effect.starts_from is not None:
             turned = self._wheels(model.wheelbase_m, chain)

@@ -8,7 +8,7 @@ from functools import partial
 
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.problem import problem_for
-from bns.diagnose.estimate.starts import best_start
+from bns.diagnose.estimate.starts import best_start, on_either_side
 from bns.diagnose.parallel import each
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.select.extending import simple
@@ -103,7 +103,7 @@ class Exchanges:
             if lacking.loss - start.loss < SCREEN * (lacking.loss - reached):
                 return None
             self._tick(effect.name)
-            fitted = loose.fit(start.model, nearby=start.jacobian_by_parameter)
+            fitted = on_either_side(loose, loose.fit(start.model, nearby=start.jacobian_by_parameter), effect)
         if fitted.loss - reached > max(BEHIND * (lacking.loss - reached), BEHIND_LOSS):
             return None
         return problem.fit(fitted.model, nearby=fit.jacobian_by_parameter)

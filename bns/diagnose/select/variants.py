@@ -12,6 +12,7 @@ from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.result import SelectionResult
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect
+from bns.physics.order import FRICTION, RAMPS
 
 CERTAIN = DEFAULTS.select.variant_certain
 EVIDENCE = DEFAULTS.select.variant_evidence
@@ -51,6 +52,25 @@ def uncertain_variants(selection: SelectionResult) -> list[Variant]:
         if SAME < abs(evidence) < CERTAIN:
             found.append(Variant(name, other, evidence, known[name].measurement))
     return found
+
+
+def order_of_friction(selection: SelectionResult) -> str:
+    """Where friction acts beside ramps, if one of them was accepted, and how much speaks for it; empty without both of them."""
+    model = selection.fit.model
+    moved = model.with_friction_moved()
+    friction, ramps = ([a.effect.name for a in model.effects if a.effect.name in kind] for kind in (FRICTION, RAMPS))
+    if moved is None or not {*friction, *ramps}.intersection(selection.accepted):
+        return ""
+    evidence = float(selection.problem.fit(moved).held_out.sum() - selection.fit.held_out.sum())
+    where = "behind" if model.is_friction_last else "before"
+    known = (
+        "For certain: held-out trials are predicted worse in the other order."
+        if evidence > CERTAIN
+        else f"Held-out trials are {np.exp(evidence):.0f} times as likely as in the other order, which is evidence, not proof."
+        if evidence > EVIDENCE
+        else "Held-out trials do not tell this from the other order."
+    )
+    return f"{' and '.join(friction)} acts {where} {' and '.join(ramps)}: the order of effects in the model's file. {known}"
 
 
 def _elsewhere(known: Mapping[str, Effect], name: str, other: str) -> bool:

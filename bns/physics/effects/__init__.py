@@ -10,6 +10,7 @@ from pathlib import Path
 
 from bns.errors import ModelError
 from bns.physics.effect import Effect
+from bns.physics.order import place
 from bns.registry import EFFECTS
 
 
@@ -30,9 +31,10 @@ def effect_named(name: str) -> Effect:
     return effect
 
 
-def chain_key(effect: Effect) -> tuple[float, str]:
+def chain_key(effect: Effect, friction_last: bool = False) -> tuple[float, str]:
     """By what effects are sorted into the order in which they act; equals stay as they came."""
-    return effect.place, effect.name if EFFECTS.is_plugin(effect.name) else ""
+    at = place(effect.name, effect.after, friction_last)
+    return at, effect.name if EFFECTS.is_plugin(effect.name) else ""
 
 
 def effect_in_file(path: Path) -> Effect:
