@@ -22,6 +22,7 @@ from analysis.ranking import TEN, in_words, ranking, varied
 from analysis.results import Results
 from analysis.selection import CONFIRMING, Selection, selections
 from bns.plotting.style import BLUE, RED, note, panels, style
+from bns.sweep.expand.shipped_sweeps import shipped_sweeps
 
 NAME = "best-combinations"
 PAPER = "the ranking of section 4.5"
@@ -74,7 +75,8 @@ def _draw(store: Results, chosen: Selection, task: str, rows: pd.DataFrame) -> F
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
     reruns, n = int(best.confirm_runs.sum()), int(best.runs.sum())
     said = coverage(store, chosen.sweeps, chosen.n)
-    how = f"bns sweep sweeps/{chosen.sweeps[0]}.yaml --confirm-top {TEN}"
+    name = chosen.sweeps[0]
+    how = f"bns sweep {name if name in shipped_sweeps() else f'{name}.yaml'} --confirm-top {TEN}"
     unconfirmed = () if reruns else (f"not confirmed on fresh seeds: {how}",)
     note(figure, "; ".join((f"{n:,} runs", *said.missing, *(unconfirmed and ("not confirmed",)), f"bars: {INTERVALS}")) + ".")
     shows = (

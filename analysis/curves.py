@@ -96,6 +96,8 @@ def _largest_gap(rows: pd.DataFrame, chosen: Selection, parameter: str) -> str:
     if shares.shape[1] < 2:
         return ""
     gaps = shares.max(axis=1) - shares.min(axis=1)
+    if not gaps.max() > 0:
+        return f"{task_title(chosen.robot, rows.task.iloc[0])}: no difference at any evaluation."
     at = shares.loc[gaps.idxmax()]
     return (
         f"{task_title(chosen.robot, rows.task.iloc[0])}: widest at evaluation {gaps.idxmax()}, "

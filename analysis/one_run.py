@@ -30,7 +30,7 @@ def draw(store: Results) -> list[FigureResult]:
         WHERE status = 'ok' AND generations_per_evaluation > 0""")
     if runs.empty:
         raise NoDataError(
-            f"no finished run has generations and probes; run bns sweep sweeps/{FIRST}.yaml, or: bns run --record full"
+            f"no finished run has generations and probes; run bns sweep {FIRST}, or: bns run --record full"
         )
     numbers = [task_number(row.robot, row.task) for row in runs.itertuples()]
     runs = runs.assign(other_sweep=runs.sweep != FIRST, other_task=[number != TASK for number in numbers])

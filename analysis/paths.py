@@ -52,7 +52,7 @@ def draw(store: Results) -> list[FigureResult]:
     runs = last_successes(store)
     if runs.empty:
         raise NoDataError(
-            f"no finished run has paths; run bns sweep sweeps/{FIRST}.yaml, or one by hand: bns run --record full"
+            f"no finished run has paths; run bns sweep {FIRST}, or one by hand: bns run --record full"
         )
     return [_draw_task(store, robot, task, found) for (robot, task), found in runs.groupby(["robot", "task"])]
 

@@ -33,7 +33,7 @@ MARKS = {
 def draw(store: Results) -> list[FigureResult]:
     rows = trials(store)
     if rows.empty:
-        raise NoDataError(f"no finished prototype trial; run bns sweep sweeps/{SWEEPS}.yaml")
+        raise NoDataError(f"no finished prototype trial; run bns sweep {SWEEPS}")
     return [_draw(store, str(robot), own) for robot, own in rows.groupby("robot")]
 
 

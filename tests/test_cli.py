@@ -223,6 +223,9 @@ def test_output_into_a_closed_pipe_is_no_fault(tmp_path, bns):
     done = subprocess.run(["bash", "-c", shell], capture_output=True, text=True, timeout=600, check=False)
     assert done.stdout == "0\n"
     assert done.stderr == ""
+    closed = f"{sys.executable} -m bns --print-completion bash | true"
+    done = subprocess.run(["bash", "-c", f"set -o pipefail; {closed}"], capture_output=True, text=True, timeout=600, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_every_error_ends_with_2():

@@ -141,8 +141,10 @@ def _moves(
 ) -> Checked:
     """Relative change of the mean diversity of the best (0) or worst (1) from an evaluation to the last."""
     rows = curves(store, chosen, task, which)
-    first = min(since, rows.evaluation.max())
-    at = rows[rows.evaluation.isin([first, rows.evaluation.max()])]
+    last = rows.evaluation.max()
+    if last <= since:
+        return Checked(claim, f"too few evaluations: {last}, and it is about what changes from evaluation {since} on", UNDECIDED)
+    at = rows[rows.evaluation.isin([since, last])]
     sums, counts = (by_seed_array(at, name)[0] for name in ("diversity", "diversities"))
     means, samples = whole_and_samples(sums, counts)
     low, high = ends(None if samples is None else samples[:, -1] / samples[:, 0] - 1)

@@ -50,11 +50,17 @@ class Model(physics.Model):
     def save(self, path: str | PathLike[str]) -> Path:
         """Write the model as a YAML file that `bns.Model` and every command read back; its path.
 
-        ModelError unless the name ends in .yaml or .yml.
+        ModelError unless the name ends in .yaml or .yml, and for an effect that is a Python object of no file.
         """
         from bns.store.disk.files import publish  # noqa: PLC0415  # a model that is not saved needs no store
 
         target = checked_target(as_path(path))
+        for active in self.effects:
+            if not active.written and active.effect.name not in self.catalogue():
+                raise ModelError(
+                    f"{active.effect.name} is an effect in Python, of which a model file can only name the file. Write it as "
+                    "EFFECT in a file of its own, add it as that file (bns.add(log, 'my_effect.py', model)), and save what that gives."
+                )
         publish(self.to_yaml().encode(), target.with_name(f".{target.name}.part"), target)
         return target
 

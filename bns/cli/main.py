@@ -37,9 +37,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of ``bns``. Exit codes: 0 done, 1 some runs failed, 2 bad input, 130 interrupted, 143 terminated."""
     usable_streams()
     warnings.showwarning = _show_warning
-    options = _parser().parse_args(arguments)
-    options.command_line = list(sys.argv[1:] if arguments is None else arguments)
     try:
+        options = _parser().parse_args(arguments)
+        options.command_line = list(sys.argv[1:] if arguments is None else arguments)
         take_trust(options)
         return _flushed(int(options.command(options)))
     except BnsError as error:

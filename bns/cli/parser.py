@@ -91,7 +91,7 @@ class Completion(argparse.Action):
         import shtab
 
         _mark_files(parser, shtab.FILE, shtab.DIRECTORY)
-        print(shtab.complete(parser, shell))
+        print(shtab.complete(parser, shell), flush=True)  # a closed pipe is noticed here, not at the exit
         parser.exit(0)
 
 

@@ -71,6 +71,8 @@ def effect_from(
     ``columns``: of the log, which a formula may use.
     """
     if term is not None:
+        if text in model.catalogue():
+            raise ModelError(f"{text} is the name of a listed effect; give the formula another one.")
         return formula_effect(text, term, on or "v", columns), {"term": term, "on": on or "v"}
     if text.endswith(".py"):
         return effect_in_file(Path(text)), {"file": str(Path(text).resolve())}

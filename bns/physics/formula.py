@@ -155,12 +155,10 @@ def _sorted(name: str, names: set[str], columns: set[str], numbers: set[str] | N
     for one in sorted(names):
         if numbers is not None and one in numbers:
             unknown.append(one)
-        elif one in columns:
+        elif one in columns or numbers is not None:
             logged.append(one)
         elif _NUMBER.fullmatch(one):
             unknown.append(one)
-        elif numbers is not None:
-            logged.append(one)
         else:
             known = unknown_name("name", one, [*VARIABLES, *columns])
             raise ModelError(f"formula {name}: {known} A number to fit is a letter (k, a, b2) or begins with k_ (k_drag).")

@@ -143,7 +143,7 @@ def test_who_cannot_be_told_from_the_best_is_corrected_for_many_comparisons(tmp_
     drawn = best_combinations.draw(Results(tmp_path))[0]
     # Fisher's test of 10 of 10 against 5 of 10 gives 0.033: below 0.05 alone, not among seven.
     assert "7 of the 7 others cannot be distinguished from it" in drawn.see
-    assert any("bns sweep sweeps/grid.yaml --confirm-top 10" in text for text in drawn.missing)
+    assert any("bns sweep grid.yaml --confirm-top 10" in text for text in drawn.missing)
 
 
 def test_what_the_sweep_command_confirms_is_what_stands_first(real_results, tmp_path):

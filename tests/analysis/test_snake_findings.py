@@ -75,6 +75,8 @@ def test_the_contrary_of_what_is_planted_differs(store):
     assert wrong.verdict == "differs"
     assert wrong.claim == "fitness error grows with the population size"
     assert two("diversity_of_best_moves", direction="grows", since=5).verdict == "differs"
+    early = two("diversity_of_best_moves", direction="grows", since=21)
+    assert (early.ours.split(",")[0], early.verdict) == ("too few evaluations: 21", "undecided")
     at_last = three("gap_at_the_end", parameter="mutation_rate", points=14.2)
     assert (at_last.ours, at_last.verdict) == ("0.0 (0.0 to 0.0) points at evaluation 21", "differs")
     assert two("gap_at_the_end", parameter="mutation_rate", points=75).verdict == "agrees"  # 4 of 4 against 1 of 4

@@ -6,6 +6,7 @@ import json
 import pickle
 import subprocess
 import sys
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import get_type_hints
 
@@ -200,6 +201,10 @@ def test_models_are_had_by_name_file_and_numbers(tmp_path):
             bns.Model(**wrong)
     with pytest.raises(bns.ModelError, match=r"end in \.yaml"):
         other.save(tmp_path / "mine.txt")
+    python = replace(other.effects[0].effect, name="own-lag")
+    with pytest.raises(bns.ModelError, match="own-lag is an effect in Python, of which a model file can only name the file"):
+        other.with_active(python, (0.1,)).save(tmp_path / "python.yaml")
+    assert not (tmp_path / "python.yaml").exists()
 
 
 def test_measurements_are_the_same_from_a_file_a_table_and_a_mapping(log, table, tmp_path):

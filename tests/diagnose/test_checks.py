@@ -128,6 +128,15 @@ def test_a_column_that_is_there_twice_is_refused(table):
         checked(pd.concat([table, table[["x_m"]]], axis=1))
 
 
+@pytest.mark.parametrize(("row", "t_s", "said"), [(5, 1e3, "lies after that of later"), (6, -1.0, "lies before an earlier one")])
+def test_one_wrong_time_costs_one_row(table, row, t_s, said):
+    """One that lies ahead used to cost all rows up to it."""
+    changed = table.assign(t_s=table.t_s.where(table.index != row, t_s))
+    usable, findings = checked(changed)
+    assert len(usable) == len(table) - 1
+    assert [f.row for f in findings if said in f.text] == [row]
+
+
 def test_poses_of_no_trial_are_said_to_be_left_out(table):
     usable, findings = checked(table.assign(trial=table.trial.where(table.index >= 20)))
     assert len(usable) == len(table) - 20

@@ -126,6 +126,22 @@ def test_what_an_unlisted_verdict_says_of_a_column_holds_its_name_and_its_comman
     assert bns.Model(tmp_path / "NEW.yaml").values_of("loss")["k"] == pytest.approx(-LOSS, abs=0.03)
 
 
+def test_a_column_whose_name_could_be_a_numbers_is_a_column_in_the_file_too():
+    added = formula_effect("twist", "k * (heading - h0)", "w", ("h0",))
+    assert [p.name for p in added.parameters] == ["k"]
+    entry = "{name: twist, term: k * (heading - h0), on: w, values: {k: -0.1}, basis: guess, reason: a test}"
+    (read,) = parse_model(f"base: differential-drive\nwheelbase_m: 0.1\neffects: [{entry}]", "robot").effects
+    assert read.by_name == {"k": -0.1}
+    assert read.effect.parameters == added.parameters
+
+
+def test_a_formula_has_a_name_of_its_own(table, tmp_path):
+    data = tmp_path / "log.csv"
+    write_measurements(table, data)
+    with pytest.raises(ModelError, match="motor-lag is the name of a listed effect; give the formula another one"):
+        bns.add(data, "motor-lag", "khepera", term="k * v", on="v")
+
+
 def test_the_names_are_documented():
     page = (Path(__file__).parents[2] / "docs" / "formulas.md").read_text()
     for name in (*VARIABLES, *FUNCTIONS, *ON):

@@ -214,8 +214,28 @@ def _merge_rows_of_one_time(table: pd.DataFrame) -> np.ndarray:
     return spare
 
 
+def _without_those_ahead(trial: str, rows: pd.DataFrame, findings: list[Finding]) -> pd.DataFrame:
+    """Without rows whose time lies after that of a later row, where they are fewer than the rows that lie before an earlier one.
+
+    A single time that is wrong in this direction would cost all rows up to it.
+    """
+    t = rows["t_s"].to_numpy()
+    ahead, behind = np.zeros((2, len(t)), dtype=bool)
+    ahead[:-1] = t[:-1] > np.minimum.accumulate(t[::-1])[::-1][1:]
+    behind[1:] = t[1:] < np.maximum.accumulate(t)[:-1]
+    if not 0 < ahead.sum() < behind.sum():
+        return rows
+    found = np.flatnonzero(ahead)
+    row, at_s = int(rows.index[found[0]]), f"{t[found[0]]:g} s"
+    one = f"time {at_s} lies after that of later rows; the row is excluded"
+    many = f"in {len(found)} rows, the first here (time {at_s}), the time lies after that of later rows; they are excluded"
+    findings.append(Finding(trial, row, one if len(found) == 1 else many))
+    return rows[~ahead]
+
+
 def forward_in_time(trial: str, rows: pd.DataFrame, findings: list[Finding]) -> pd.DataFrame:
-    """Rows later than all before them."""
+    """Rows later than all before them; without those that lie ahead of later rows, where these are fewer than the ones behind."""
+    rows = _without_those_ahead(trial, rows, findings)
     t = rows["t_s"].to_numpy()
     latest = np.maximum.accumulate(t)
     good = np.ones(len(t), dtype=bool)

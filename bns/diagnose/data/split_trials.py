@@ -34,7 +34,8 @@ def split(table: pd.DataFrame, by: str, seconds: float) -> pd.DataFrame:
     if not (np.diff(t) >= 0).all():
         row = int(np.flatnonzero(~(np.diff(t) >= 0))[0]) + 1
         raise DataError(
-            f"Row {row}: t_s runs backwards or is empty; a log that is cut into trials must be sorted by time."
+            f"Row {row}: t_s runs backwards or is empty; a log that is cut into trials must be sorted by time. If the time "
+            "starts again with every trial, give the log a column trial (in pandas: (log.t_s.diff() < 0).cumsum())."
         )
     trial = _CUTS[by](table, t, seconds)
     if trial.max() < 1:
