@@ -59,7 +59,7 @@ class Model(physics.Model):
             if not active.written and active.effect.name not in self.catalogue():
                 raise ModelError(
                     f"{active.effect.name} is an effect in Python, of which a model file can only name the file. Write it as "
-                    "EFFECT in a file of its own, add it as that file (bns.add(log, 'my_effect.py', model)), and save what that gives."
+                    "EFFECT in a file of its own, add that file (bns.add(log, 'my_effect.py', model)), and save what that gives."
                 )
         publish(self.to_yaml().encode(), target.with_name(f".{target.name}.part"), target)
         return target
