@@ -4,6 +4,7 @@ from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from bns.diagnose.data.tracks import tracks_of
@@ -11,6 +12,7 @@ from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_extended, fit_with
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.select.exchanges import Exchanges
 from bns.diagnose.select.result import SelectionResult
 from bns.diagnose.select.variants import order_of_friction
 from bns.physics.effects import all_effects, effect_named
@@ -46,6 +48,26 @@ def test_one_that_extends_another_is_tried_on_either_side():
     wrong = hidden(**ORDERS["behind"])
     fit = fit_extended(problem, problem.fit(wrong), effect_named("dead-zone-mismatch"))
     assert names(fit.model) == ["dead-zone-mismatch", "acceleration-limit"]
+
+
+def test_one_that_takes_anothers_place_is_tried_on_either_side():
+    """The friction that goes acts behind the ramp, the true one before it."""
+    predictor = predictor_of("before")
+    problem = problem_for(predictor, hidden(**ORDERS["before"]))
+    fit = problem.fit(hidden(**LIMIT, stribeck={"width_m_s": 0.015, "fade_m_s": 0.1}))
+    catalogue = {"dead-zone": effect_named("dead-zone")}
+    found = Exchanges(predictor, catalogue, catalogue, lambda _: None).of(problem, fit, ("acceleration-limit", "stribeck"))
+    (tried,) = (tried for gone, _, tried in found if gone == "stribeck")
+    assert names(tried.model) == ["dead-zone", "acceleration-limit"]
+
+
+def test_starts_from_tracks_see_the_wheels_behind_the_ramp():
+    seen = []
+    effect = replace(effect_named("breakaway"), starts_from=lambda wheels: seen.append(wheels.left_m_s) or ())
+    predictor, ramp = predictor_of("behind"), hidden(**LIMIT)
+    predictor.starts_of(effect, ramp)
+    np.testing.assert_array_equal(seen[0], predictor.turned(ramp).left_m_s)
+    assert (seen[0] != predictor.turned(NOMINAL).left_m_s).any()
 
 
 @pytest.mark.slow

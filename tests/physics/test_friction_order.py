@@ -60,7 +60,10 @@ def test_a_models_file_says_the_order(order, tmp_path):
     values = {"dead-zone": "{width_m_s: 0.01}", "acceleration-limit": "{max_m_s2: 0.3}"}
     entries = (f"  - {{name: {name}, values: {values[name]}, basis: guess, reason: a test}}\n" for name in order)
     (tmp_path / "robot.yaml").write_text(f"base: differential-drive\nwheelbase_m: 0.1\neffects:\n{''.join(entries)}")
-    assert names(load_model(tmp_path / "robot.yaml").arranged()) == list(order)
+    model = load_model(tmp_path / "robot.yaml")
+    assert names(model.arranged()) == list(order)
+    for gone in order:
+        assert names(active(model.without(gone), gone)) == list(order)
 
 
 @pytest.mark.parametrize("last", [True, False])
