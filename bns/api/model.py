@@ -61,7 +61,9 @@ class Model(physics.Model):
                     f"{active.effect.name} is an effect in Python, of which a model file can only name the file. Write it as "
                     "EFFECT in a file of its own, add that file (bns.add(log, 'my_effect.py', model)), and save what that gives."
                 )
-        publish(self.to_yaml().encode(), target.with_name(f".{target.name}.part"), target)
+        effects = tuple(_named_from(active, target.resolve().parent) for active in self.effects)
+        text = dataclasses.replace(self, effects=effects).to_yaml() if effects != self.effects else self.to_yaml()
+        publish(text.encode(), target.with_name(f".{target.name}.part"), target)
         return target
 
     def to_yaml(self) -> str:
@@ -140,6 +142,14 @@ def no_wheels(given: Given) -> str:
     """That a wheelbase was given for what has none."""
     named = given.name if isinstance(given, physics.Model) else fspath(given)
     return f"The model {named} has no wheels: leave {in_both('--wheelbase', 'wheelbase_m')} out."
+
+
+def _named_from(active: physics.ActiveEffect, folder: Path) -> physics.ActiveEffect:
+    """The effect with its Python file named by its name alone, where that lies in the same folder: both can be moved together."""
+    file = Path(active.written.get("file", ""))
+    if not file.is_absolute() or file.parent != folder:
+        return active
+    return dataclasses.replace(active, written={**active.written, "file": file.name})
 
 
 def _names_a_body(given: Given | None) -> bool:

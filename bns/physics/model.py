@@ -219,7 +219,7 @@ class Model:
         name = back.effect.name
         heir = next((a for a in rest.effects if name in (a.effect.extends, *a.effect.contains) and not a.replaces), None)
         if heir is None:
-            return rest._in_order((*rest.effects, back), self.is_friction_last)  # a model of this class
+            return rest._in_order((*rest.effects, back), self.is_friction_last)
         return replace(rest, effects=tuple(replace(a, replaces=back) if a is heir else a for a in rest.effects))
 
     def canonical_json(self) -> str:
@@ -257,7 +257,11 @@ def load_model(name_or_path: str | Path) -> Model:
     if path.suffix in {".yaml", ".yml"}:
         if not path.is_file():
             raise ModelError(f"There is no model file {path}. Give the path of a YAML file or one of: {', '.join(_names())}.")
-        return parse_model(text_of(path, "the model", ModelError), path.stem, path.parent)
+        text = text_of(path, "the model", ModelError)
+        try:
+            return parse_model(text, path.stem, path.parent)
+        except ModelError as fault:
+            raise type(fault)(f"{path}: {fault}") from fault
     if str(name_or_path) not in model_names():
         if path.is_file():
             raise ModelError(

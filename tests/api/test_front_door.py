@@ -22,7 +22,7 @@ from bns.api.common.shown import Shown
 from bns.api.run import Parameters, _first
 from bns.cli.main import main
 from bns.measurements import write_measurements
-from bns.physics.effects import all_effects
+from bns.physics.effects import all_effects, effect_in_file
 from bns.spec import FIELDS
 from bns.sweep.expand.grid import load_sweep
 from bns.sweep.expand.order import ordered_specs
@@ -205,6 +205,18 @@ def test_models_are_had_by_name_file_and_numbers(tmp_path):
     with pytest.raises(bns.ModelError, match="own-lag is an effect in Python, of which a model file can only name the file"):
         other.with_active(python, (0.1,)).save(tmp_path / "python.yaml")
     assert not (tmp_path / "python.yaml").exists()
+
+
+def test_an_effects_file_in_the_models_folder_is_named_by_its_name(tmp_path):
+    (tmp_path / "own.py").write_text(
+        "from dataclasses import replace\nfrom bns.physics.effects import effect_named\n"
+        "EFFECT = replace(effect_named('motor-lag'), name='own-lag')\n"
+    )
+    (tmp_path / "elsewhere").mkdir()
+    added = bns.Model(wheelbase_m=0.1).with_active(effect_in_file(tmp_path / "own.py"), (0.1,))
+    added = replace(added, effects=tuple(replace(a, written={"file": str(tmp_path / "own.py")}) for a in added.effects))
+    assert "  file: own.py\n" in added.save(tmp_path / "model.yaml").read_text()
+    assert f"  file: {tmp_path / 'own.py'}\n" in added.save(tmp_path / "elsewhere" / "model.yaml").read_text()
 
 
 def test_measurements_are_the_same_from_a_file_a_table_and_a_mapping(log, table, tmp_path):

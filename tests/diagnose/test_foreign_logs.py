@@ -259,6 +259,24 @@ def test_a_log_without_a_mapping_is_answered_with_a_draft(bag, capsys):
     assert not (folder / "m.csv").exists()
 
 
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("trial,t_s,x_m,x_m\n0,0,1,2\n", r"a\.csv has more than one column x_m; leave out all but one of that name"),
+        ('t_s,x_m\n0,1\n1,2,3,4\n', r"a\.csv does not read as csv: line 3 has 4 columns, and the first line 2; put texts"),
+    ],
+)
+def test_tables_that_are_no_tables_are_refused_in_words(tmp_path, text, message):
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(DataError, match=message):
+        read_table(tmp_path / "a.csv")
+
+
+def test_columns_that_nobody_reads_may_be_there_twice(tmp_path):
+    (tmp_path / "a.csv").write_text("t_s,mark,mark\n0,1,2\n")
+    assert list(read_table(tmp_path / "a.csv").columns) == ["t_s", "mark", "mark.1"]
+
+
 @pytest.mark.parametrize("separator", [";", "\t"])
 def test_spreadsheets_of_other_countries_are_read(tmp_path, separator):
     table = pd.DataFrame({"a": [1.5, 2.25], "b": [3.0, 4.5]})

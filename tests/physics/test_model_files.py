@@ -77,6 +77,13 @@ def test_commands_refuse_the_program_and_say_how_to_allow_it(colleague, bns, com
     assert colleague.with_name("ran").exists()
 
 
+def test_what_is_wrong_names_the_file(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text("base: foo\nwheelbase_m: 0.1\n")
+    with pytest.raises(ModelError, match=re.escape(f"{path}: ") + ".*unknown base 'foo'"):
+        load_model(path)
+
+
 def test_documented_form_of_a_formula_works():
     entry = "  - name: rub\n    term: k * v * abs(w)\n    on: v\n    values: {k: 0.1}\n    basis: guess\n    reason: x\n"
     text = f"{HEAD}effects:\n{entry}"

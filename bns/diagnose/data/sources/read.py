@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zlib
 from pathlib import Path
 
@@ -54,4 +55,8 @@ def read_table(path: Path) -> pd.DataFrame:
 def _in_words(fault: Exception) -> str:
     if isinstance(fault, UnicodeDecodeError):
         return "it is no text in UTF-8. Save it as UTF-8, or give it the ending of what it is (.parquet)"
-    return str(fault).rstrip(".")
+    found = re.search(r"Expected (\d+) fields in line (\d+), saw (\d+)", str(fault))
+    if found:
+        expected, line, saw = found.groups()
+        return f"line {line} has {saw} columns, and the first line {expected}; put texts with separators into quotes"
+    return str(fault).strip().rstrip(".")

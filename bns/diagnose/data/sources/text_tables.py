@@ -12,6 +12,7 @@ import pandas as pd
 
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
+from bns.measurements import COLUMNS
 
 MOST_COLUMNS = DEFAULTS.data.most_columns
 _LONGEST_LINE = DEFAULTS.data.longest_line
@@ -57,6 +58,11 @@ def read_text_table(path: Path) -> pd.DataFrame:
     )
     if names and numbers:
         table.columns = pd.Index(names)
+        return table
+    given = [cell.strip('"') for cell in _cells(first, separator)]
+    twice = sorted({name for name in given if name in COLUMNS and given.count(name) > 1})
+    if twice:  # pandas would call the second x_m.1, and nobody would read it
+        raise DataError(f"{path} has more than one column {', '.join(twice)}; leave out all but one of that name.")
     return table
 
 
