@@ -227,6 +227,7 @@ def test_what_no_pose_depends_on_may_be_anything_that_is_allowed():
 OVERSHOOT = {"tau_s": 0.06, "lead_s": 0.1, "swing_s": 0.12, "turn_ratio": 0.5}
 
 
+@pytest.mark.slow
 def test_controllers_that_overshoot_are_found_and_told_from_a_late_clock():
     found = selected(hidden(controller_overshoot=OVERSHOOT))
     assert found.accepted == ("controller-overshoot",)

@@ -208,6 +208,7 @@ def test_every_listed_effect_is_described_in_everyday_words():
     assert all(word not in text for text in words.values() for word in ("omega", "residual", "parameter"))
 
 
+@pytest.mark.slow
 def test_a_gain_by_chance_is_that_of_the_best_of_all_effects_that_were_tried(page_of):
     """One in twenty thousand for one effect is not that for the best of thirty."""
     said = re.search(r"to any of the (\d+) effects tried is at most ([0-9.e-]+)\.", page_of("effects").read_text())

@@ -152,6 +152,7 @@ def test_a_rival_must_have_earned_its_place(monkeypatch, name, values, competing
     assert len(search._competing_models(problem, fit, ("camera-scale",))) == competing_models
 
 
+@pytest.mark.slow
 def test_what_asks_for_too_much_once_noise_and_numbers_have_settled_is_passed_over(monkeypatch):
     def rejected_because(fit, name, bounds=True):
         return "too much" if name == "wheelbase" and not bounds else implausible(fit, name, bounds)
@@ -209,6 +210,7 @@ def with_a_gain():
     return table, search, search.run()
 
 
+@pytest.mark.slow
 def test_the_end_of_a_search_stands_without_one_trial(with_a_gain):
     table, _, end = with_a_gain
     again = searched(table, 3)
@@ -221,6 +223,7 @@ def test_the_end_of_a_search_stands_without_one_trial(with_a_gain):
     assert end.fit.losses[3] > 0.0
 
 
+@pytest.mark.slow
 def test_an_end_does_not_stand_where_an_effect_would_go_come_or_be_exchanged(with_a_gain, monkeypatch):
     table, search, end = with_a_gain
 

@@ -33,6 +33,7 @@ class Simulated:
     MEMORY_CLOCK_RATE, GLOBAL_MEMORY_BUS_WIDTH = 3_201_000, 6144
 
 
+@pytest.mark.slow
 def test_slices_of_both_studies_are_measured_and_the_table_is_printed(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(gpu, "current_device", Simulated)
     monkeypatch.setattr(gpu, "ordered_specs", lambda sweep: tiny(sweep.robot, 3))

@@ -74,7 +74,9 @@ def fit_with(problem: Problem, base: Fit, effect: Effect, known: Model | None = 
 def on_either_side(problem: Problem, fit: Fit, effect: Effect) -> Fit:
     """The fit, or that with friction on the other side of the ramps where this is better: asked when one of the two came in."""
     moved = fit.model.with_friction_moved() if effect.name in {*FRICTION, *RAMPS} else None
-    other = fit if moved is None else problem.fit(moved)
+    if moved is None:
+        return fit
+    other = problem.fit(moved)
     return other if other.loss < fit.loss else fit
 
 

@@ -70,7 +70,8 @@ def order_of_friction(selection: SelectionResult) -> str:
         if evidence > EVIDENCE
         else "Held-out trials do not tell this from the other order."
     )
-    return f"{' and '.join(friction)} acts {where} {' and '.join(ramps)}: the order of effects in the model's file. {known}"
+    acts = f"{' and '.join(friction)} {'acts' if len(friction) == 1 else 'act'} {where} {' and '.join(ramps)}"
+    return f"{acts}: the order of effects in the model's file. {known}"
 
 
 def _elsewhere(known: Mapping[str, Effect], name: str, other: str) -> bool:

@@ -121,7 +121,9 @@ def test_a_robot_stands_when_its_trial_is_there_and_does_nothing(tmp_path, nurse
     seen = outlive.outlived(nursery, link, cause, tmp_path, patient=cause != "hang")
     assert seen.events[0]["why"].startswith(why)
     if cause == "hang":  # at least: a busy computer looks later
-        assert float(seen.events[0]["why"].removeprefix(why).removesuffix(" s")) >= shipped_rig("khepera").limits.silent_s
+        said, allowed_s = seen.events[0]["why"].removeprefix(why), shipped_rig("khepera").limits.silent_s
+        assert float(said.split()[0]) >= allowed_s
+        assert said.endswith(f" s (the rig's silent_s allows {allowed_s:g} s)")
     assert "stopped" in [e["kind"] for e in seen.events]
 
 
@@ -168,7 +170,9 @@ def test_a_guard_has_the_patience_of_its_rig(tmp_path, monkeypatch):
 def test_what_the_terminal_does_stops_the_robot_first(tmp_path, nursery, cause, link, said):
     """Ctrl-Z suspends the process once the robot stands (the helper sees to it); gone on with, the trial is paused."""
     seen = outlive.outlived(nursery, link, cause, tmp_path, patient=True)
-    assert (seen.ended, seen.said) == (3, said)
+    first = "the guard stopped the robot: the trial was asked to stop"  # on a busy computer the guard is quicker than the trial
+    assert seen.ended == 3
+    assert seen.said in {said, first}
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc, for clocks that say that the computer slept")
