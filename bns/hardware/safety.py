@@ -167,7 +167,9 @@ class Stopping:
     def check(self) -> None:
         """TrialPausedError if a stop was asked for."""
         for cause in self.causes:
-            self.reason = self.reason or cause()
+            found = cause()  # a signal that comes meanwhile is the first reason
+            if found is not None:
+                self.request(found)
         if self.reason is not None:
             raise TrialPausedError(self.reason)
 

@@ -199,13 +199,12 @@ class Model:
 
     def _in_order(self, effects: Iterable[ActiveEffect], friction_last: bool) -> Model:
         effects = tuple(effects)
-        behind = friction_last and any(active.effect.name in RAMPS for active in effects)
-        arranged = tuple(sorted(effects, key=lambda a: chain_key(a.effect, behind)))
+        arranged = tuple(sorted(effects, key=lambda a: _key(a.effect, effects, friction_last)))
         return replace(self, effects=arranged, friction_last=friction_last)
 
     def key_of(self, effect: Effect) -> tuple[float, str]:
         """Where an effect acts, or would act, beside those of the model (`chain_key`)."""
-        return chain_key(effect, self.is_friction_last and any(active.effect.name in RAMPS for active in self.effects))
+        return _key(effect, self.effects, self.is_friction_last)
 
     def without(self, name: str) -> Model:
         """The model with that effect switched off; with the simpler one again whose place it took."""
@@ -235,6 +234,11 @@ class Model:
     def digest(self) -> str:
         """SHA-256 of `canonical_json`, 20 hexadecimal digits."""
         return hashlib.sha256(self.canonical_json().encode()).hexdigest()[:20]
+
+
+def _key(effect: Effect, beside: Iterable[ActiveEffect], friction_last: bool) -> tuple[float, str]:
+    """`chain_key`; where no ramp is beside an effect, friction has its own place."""
+    return chain_key(effect, friction_last and any(active.effect.name in RAMPS for active in beside))
 
 
 def model_names() -> list[str]:

@@ -81,8 +81,8 @@ ORDER = (
 FRICTION = ("dead-zone", "dead-zone-mismatch", "friction-warm-up", "stribeck", "dead-band", "breakaway")
 """What a wheel loses at a steady speed, or stands still for. It acts before `RAMPS` or behind all of them.
 
-The order shows: behind a ramp a wheel stands until the ramp has reached what friction takes, and it stops earlier. A ramp of
-commands (a speed profile) has friction behind it; firmware that ramps what it has reduced already has it before.
+The order shows: behind a ramp a wheel stands until the ramp has reached what friction takes, at a start and, twice as long, at
+a reversal. A ramp of commands (a speed profile) has friction behind it; firmware that ramps what it has reduced has it before.
 """
 RAMPS = ("acceleration-limit", "force-limit", "braking-limit", "velocity-ramp", "braking-ramp")
 

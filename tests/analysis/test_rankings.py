@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import re
 import shutil
+from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 from figure_helpers import MUTATION, carry_out, curves, with_evals, written
 
 from analysis import best_combinations, diversity_of_extremes, potential_success
 from analysis.checks import best_combination, success
+from analysis.curves import _largest_gap
 from analysis.labels import CELL
 from analysis.ranking import extremes, in_words, ranking
 from analysis.results import NoDataError, Results
@@ -144,6 +147,21 @@ def test_who_cannot_be_told_from_the_best_is_corrected_for_many_comparisons(tmp_
     # Fisher's test of 10 of 10 against 5 of 10 gives 0.033: below 0.05 alone, not among seven.
     assert "7 of the 7 others cannot be distinguished from it" in drawn.see
     assert any("bns sweep grid.yaml --confirm-top 10" in text for text in drawn.missing)
+
+
+def test_a_shipped_sweep_is_named_as_the_command_takes_it(tmp_path):
+    written(tmp_path, "khepera", [*rated(0.1, seeds=10, good=5), *rated(0.3, seeds=10, good=9)])
+    drawn = best_combinations.draw(Results(tmp_path))[0]
+    assert any("bns sweep khepera --confirm-top 10" in text for text in drawn.missing)
+
+
+def test_curves_that_lie_on_each_other_differ_nowhere():
+    values = [{"evaluation": e, "value": v, "successes": 1, "runs": 2, "task": "circle"} for e in (1, 2) for v in (0.1, 0.9)]
+    chosen = SimpleNamespace(robot="khepera")
+    assert _largest_gap(pd.DataFrame(values), chosen, "mutation_rate").endswith(": no difference at any evaluation.")
+    values[0]["successes"] = 2
+    apart = _largest_gap(pd.DataFrame(values), chosen, "mutation_rate")
+    assert "widest at evaluation 1, 50 points between 10 % and 90 %" in apart
 
 
 def test_what_the_sweep_command_confirms_is_what_stands_first(real_results, tmp_path):

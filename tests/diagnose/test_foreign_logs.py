@@ -171,6 +171,13 @@ def test_a_log_without_stops_is_cut_into_pieces_that_begin_in_motion():
         assert (ahead["left_m_s"].to_numpy() == log["left_m_s"].to_numpy()[there]).all(), trial
 
 
+def test_a_time_that_starts_again_with_every_trial_is_told_what_to_do():
+    table = pd.DataFrame({"t_s": [0.0, 0.1, 0.0, 0.1], "left_m_s": 0.1, "right_m_s": 0.1})
+    with pytest.raises(DataError, match=r"Row 2: t_s runs backwards .* give the log a column trial \(in pandas: .*cumsum"):
+        split(table, "gap_s", 1.0)
+    assert (table.t_s.diff() < 0).cumsum().tolist() == [0, 0, 1, 1]
+
+
 def test_gaps_cut_a_log_where_nothing_was_written():
     log = continuous(measured(NOMINAL, trials=3))
     kept = log[(log["left_m_s"].abs() > 0) | (log["right_m_s"].abs() > 0)]

@@ -50,6 +50,14 @@ def test_an_adapter_that_echoes_is_found_out(chain):
     assert not any(servo.get("torque_enable") for servo in bus.servos)
 
 
+def test_an_answer_that_is_an_echo_is_asked_for_again(chain, monkeypatch):
+    driver, _, _ = chain()
+    heard = iter([True, False])
+    monkeypatch.setattr(type(driver._port), "heard_itself", property(lambda _: next(heard, False)))
+    assert driver.read(2, "torque_limit") == 1023
+    assert driver.retries == 1
+
+
 def test_an_echo_is_looked_for_only_where_something_is_wrong(chain):
     heard = []
 

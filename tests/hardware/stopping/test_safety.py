@@ -50,6 +50,14 @@ def test_a_computer_that_is_too_busy_pauses_the_trial(clock):
         watch.check(sight(clock))
 
 
+@pytest.mark.parametrize("found", [None, "the guard stopped the robot: the trial was asked to stop"])
+def test_a_signal_while_causes_are_asked_for_is_neither_lost_nor_called_otherwise(found):
+    stopping = Stopping()
+    stopping.causes.append(lambda: (stopping._handle(signal.SIGQUIT, None), found)[1])
+    with pytest.raises(TrialPausedError, match=r"^quit$"):
+        stopping.check()
+
+
 @pytest.mark.parametrize(("number", "word"), [(signal.SIGINT, "interrupted"), (signal.SIGTERM, "terminated")])
 def test_signals_are_noted_and_handlers_put_back(clock, number, word):
     before = signal.getsignal(number)
