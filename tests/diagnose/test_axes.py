@@ -1,11 +1,15 @@
 """Axes of the figures: labels that do not overlap, names with units, paths that can be seen."""
 
+from itertools import pairwise
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from bns.diagnose.report.figures import _axis, _minor_labels
-from bns.diagnose.report.proposal_figure import _zoom
+from bns.diagnose.report.figures import _axis, _minor_labels, errors_axes
+from bns.diagnose.report.proposal_figure import _legend_below, _zoom
+from bns.plotting.style import PAGE_IN, style
 
 
 @pytest.mark.parametrize(("low", "high", "labelled"), [(3.0, 80.0, "25"), (3.0, 12.0, "2357"), (3.0, 5.0, "23456789")])
@@ -27,3 +31,38 @@ def test_short_paths_fill_their_panel_and_long_ones_show_the_arena():
         assert bool(np.ptp(axis.get_xlim()) < 50.0) is zoomed
     _zoom(axis, np.zeros((2, 2)), 250.0)
     assert axis.get_xlim() == (0, 250)
+
+
+SHORT, LONG = ["motor-lag", "dead-zone", "wheelbase"], ["motor-lag + marker-offset + wheel-mismatch + speed-gain"] * 3
+
+
+@style()
+@pytest.mark.parametrize(("names", "columns"), [(SHORT, 3), (LONG, 1)])
+def test_a_legend_of_explanations_stays_within_the_page(names, columns):
+    figure = Figure(figsize=(PAGE_IN, 2.6))
+    axes = figure.subplots()
+    for name in names:
+        axes.plot([0, 1], [0, 1], label=name)
+    _legend_below(figure, axes)
+    figure.canvas.draw()
+    shown = figure.legends[0].get_window_extent()
+    assert figure.legends[0]._ncols == columns
+    assert 0 <= shown.x0 < shown.x1 <= figure.bbox.x1
+
+
+@style()
+@pytest.mark.parametrize("names", [["as given", "+ motor-lag"], ["as given", *(f"+ {name}" for name in (*SHORT, "speed-gain"))]])
+def test_names_along_the_axis_do_not_touch(names):
+    model = SimpleNamespace(rms_m=0.01, low_m=0.009, high_m=0.011)
+    errors = SimpleNamespace(windows=9, models=[model] * len(names), noise_floor_m=0.001, horizon="1s")
+    figure = Figure(figsize=(PAGE_IN * 0.75, 3.0))
+    axes = figure.subplots()
+    errors_axes(axes, SimpleNamespace(horizons={"1s": errors}), names)
+    figure.canvas.draw()
+    labels = axes.get_xticklabels()
+    if labels[0].get_rotation() == 0:
+        ends = [label.get_window_extent() for label in labels]
+        assert all(one.x1 < other.x0 for one, other in pairwise(ends))
+    else:
+        assert {label.get_ha() for label in labels} == {"right"}
+    assert (labels[0].get_rotation() != 0) is (len(names) > 2)

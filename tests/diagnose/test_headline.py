@@ -9,7 +9,7 @@ from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.report.plain_language import further_notes, headline, with_what
+from bns.diagnose.report.plain_language import further_notes, head_of_page, headline, with_what
 from bns.diagnose.report.text import diagnosis_text
 from bns.diagnose.select.stepwise import StepwiseSelection
 from bns.physics.effects import effect_named
@@ -59,6 +59,26 @@ def test_effects_come_before_what_is_not_explained(monkeypatch):
     assert with_what(found) == "With it"
     bare = headline(replace(found, verdict="unlisted", selection=replace(found.selection, accepted=())))
     assert bare == "Something is missing from the model that none of the known effects explains."
+
+
+def test_the_head_of_a_page_lists_three_effects_and_says_two_in_one_sentence(monkeypatch):
+    predictor = WheelPredictor(tracks_of(measured(hidden(yaw_bias={"rate_rad_s": 0.05}), trials=14, seed=11)))
+    found = found_with(monkeypatch, predictor, "yaw-bias")
+    lag, mismatch = (effect_named(name).in_words for name in ("motor-lag", "wheel-mismatch"))
+    two, three = (replace(found.selection, accepted=names) for names in (("motor-lag", "wheel-mismatch"), NAMES))
+    of_two, of_three = (replace(found, selection=one, verdict="effects") for one in (two, three))
+    assert head_of_page(of_two) == (f"Missing from the model: {lag} and {mismatch}.", [])
+    title, listed = head_of_page(of_three)
+    assert title == "Missing from the model: 3 effects."
+    assert listed[:2] == [lag, mismatch]
+    assert headline(of_three) == f"Missing from the model: {lag}; {mismatch}; and {listed[2]}."
+    title, _ = head_of_page(replace(of_three, verdict="unlisted"))
+    assert title == "Missing from the model: 3 effects, and something that none of the known effects explains."
+    tied = replace(of_three, selection=replace(three, competing_models=(("motor-lag",),)), verdict="unlisted")
+    assert head_of_page(tied) == (headline(tied), [])
+
+
+NAMES = ("motor-lag", "wheel-mismatch", "yaw-bias")
 
 
 def test_a_verdict_says_how_much_and_to_which_side(monkeypatch):

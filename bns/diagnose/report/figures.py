@@ -17,7 +17,10 @@ from bns.diagnose.data.variables import label as in_words
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.predict.paired_errors import PairedErrors
 from bns.diagnose.report.text import ahead
+from bns.diagnose.settings import DEFAULTS
 from bns.plotting.style import GREY, OKABE_ITO, PAGE_IN, save, style
+
+_TICK_CHARACTERS = DEFAULTS.report.tick_characters
 
 
 @style()
@@ -140,7 +143,8 @@ def errors_axes(axes: Axes, errors: PairedErrors, names: Sequence[str]) -> None:
         )
         if np.isfinite(e.noise_floor_m):
             axes.plot([0, len(values) - 1], [1e3 * e.noise_floor_m] * 2, color=colour, linestyle=":", linewidth=1)
-    axes.set_xticks(range(len(names)), names)
+    crowded = sum(map(len, names)) > _TICK_CHARACTERS
+    axes.set_xticks(range(len(names)), names, rotation=25 if crowded else 0, ha="right" if crowded else "center")
     axes.set_xlim(-0.3, len(names) - 0.7)
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter("{x:g}")

@@ -24,7 +24,7 @@ from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.report import tables
 from bns.diagnose.report.figures import comparison_figure, diagnosis_figure, error_by_step_figure
-from bns.diagnose.report.plain_language import certainty, further_notes, headline, numbers_in_words
+from bns.diagnose.report.plain_language import certainty, further_notes, head_of_page, numbers_in_words
 from bns.diagnose.report.proposal_figure import plan_figure
 from bns.diagnose.report.proposal_text import proposal_lines
 from bns.diagnose.report.shown_paths import shown_paths
@@ -90,6 +90,7 @@ def report_html(m: Material, command: Mapping[str, str]) -> str:
 def _values(m: Material, command: Mapping[str, str]) -> dict[str, Any]:
     d, has_found = m.diagnosis, m.diagnosis.selection is not None
     has_after = bool(m.paths) and "after" in m.paths[0]
+    head, causes = head_of_page(d)
     values: dict[str, Any] = {
         "css": Markup(_part("report.css")),
         "js": Markup(_part("report.js")),
@@ -98,7 +99,8 @@ def _values(m: Material, command: Mapping[str, str]) -> dict[str, Any]:
         "trials": len(m.measured.tracks),
         "verdict": d.verdict,
         "near": "one second" if m.near == "1s" else f"one {m.near}",
-        "headline": headline(d),
+        "headline": head,
+        "causes": causes,
         "certainty": certainty(d),
         "numbers": numbers_in_words(d.selection.fit, d.effects, d.numbers) if d.selection is not None else [],
         "moments": d.behaviour[: len(d.behaviour) - len(d.terms_in_words)],

@@ -18,6 +18,7 @@ from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import numbers_of, without_width
 
 _CAUSES = DEFAULTS.report.causes
+_LISTED = DEFAULTS.report.listed_causes
 
 
 def figures_in_words(value: float, low: float | None, high: float | None, unit: str) -> tuple[str, str]:
@@ -51,6 +52,7 @@ def numbers_in_words(
     ``numbers``: by effect and parameter, in the place of those of the fit.
     """
     texts = {(f.effect, f.parameter.name): f.parameter.text for f in fit.free}
+    numbers = numbers_of(fit) if numbers is None else numbers
     return [
         {
             "effect": effect,
@@ -61,9 +63,8 @@ def numbers_in_words(
             ),
             "exact": f"{n['value']:.6g} {n['unit'] if n['unit'] != '1' else ''}".strip(),
         }
-        for effect, values in (numbers_of(fit) if numbers is None else numbers).items()
-        if effect in names
-        for name, n in values.items()
+        for effect in names
+        for name, n in numbers.get(effect, {}).items()
     ]
 
 
@@ -89,6 +90,15 @@ def headline(d: Diagnosis) -> str:
     }[d.verdict]
 
 
+def head_of_page(d: Diagnosis) -> tuple[str, list[str]]:
+    """The verdict as the title of a page, and what happens as a list below it: empty where the title says it."""
+    tied = d.selection is not None and bool(d.selection.competing_models)
+    if d.verdict not in {"effects", "unlisted"} or tied or len(d.effects) < _LISTED:
+        return headline(d), []
+    rest = ", and something that none of the known effects explains" if d.verdict == "unlisted" else ""
+    return f"Missing from the model: {len(d.effects)} effects{rest}.", _each_of(d, d.effects, d.numbers)
+
+
 def with_what(d: Diagnosis) -> str:
     """The extended model, as the beginning of a sentence that follows the headline."""
     if d.verdict == "tie":
@@ -107,8 +117,13 @@ def further_notes(d: Diagnosis, formula: bool = False) -> list[str]:
 
 def _all_of(d: Diagnosis, names: tuple[str, ...], numbers: Mapping[str, Mapping[str, Mapping[str, Any]]] | None = None) -> str:
     """What happens where these effects are at work, in everyday words; how much, where ``numbers`` has it."""
+    said = _each_of(d, names, numbers)
+    return " and ".join(said) if len(said) < _LISTED else f"{'; '.join(said[:-1])}; and {said[-1]}"
+
+
+def _each_of(d: Diagnosis, names: tuple[str, ...], numbers: Mapping[str, Mapping[str, Mapping[str, Any]]] | None) -> list[str]:
     known = known_effects(d.selection) if d.selection else {}
-    return " and ".join(sized_sentence(known[name], (numbers or {}).get(name, {})) for name in names)
+    return [sized_sentence(known[name], (numbers or {}).get(name, {})) for name in names]
 
 
 def certainty(d: Diagnosis) -> str:

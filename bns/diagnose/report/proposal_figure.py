@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
@@ -21,6 +22,7 @@ from bns.plotting.style import GREY, OKABE_ITO, lettered, panels, save, style
 
 _FRAME_S = DEFAULTS.report.frame_s
 _SHOWN = DEFAULTS.report.planned_trials
+_LEGEND_CHARACTERS = DEFAULTS.report.legend_characters
 
 
 @style()
@@ -35,8 +37,14 @@ def plan_figure(p: Proposal, path: Path) -> Path:
         _draw_trial(axis, p, seen, trial)
         axis.set_ylabel("y, north (cm)" if trial == 0 else "")
         axis.set_title(lettered(trial, shown, f"trial {trial}, {p.plan.lasting_s[trial]:.0f} s"))
-    figure.legend(*axes[0][0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    _legend_below(figure, axes[0][0])
     return save(figure, path)[0]
+
+
+def _legend_below(figure: Figure, axes: Axes) -> None:
+    """Explanations by name, in as many columns as the longest name leaves room for."""
+    handles, names = axes.get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside lower center", ncols=max(1, min(3, _LEGEND_CHARACTERS // max(map(len, names)))))
 
 
 def _repeats_figure(p: Proposal, plan: Repeats, path: Path) -> Path:
@@ -47,7 +55,7 @@ def _repeats_figure(p: Proposal, plan: Repeats, path: Path) -> Path:
         _draw_repeat(axis, p, plan, trial)
         axis.set_ylabel("to its left (cm)" if trial == 0 else "")
         axis.set_title(lettered(trial, shown, f"trial {trial}, {plan.lasting_s[trial]:.0f} s"))
-    figure.legend(*axes[0][0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    _legend_below(figure, axes[0][0])
     return save(figure, path)[0]
 
 

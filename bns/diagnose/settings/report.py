@@ -31,6 +31,15 @@ class Report:
         2.0, "1", f"From this factor on, up or down, a sentence says a factor and not a percentage; {BY_HAND}."
     )
     causes: int = setting(3, "causes", f"Largest number of causes in a headline; {BY_HAND}.")
+    listed_causes: int = setting(
+        3, "causes", f"From so many effects on, the head of a page lists what happens instead of one sentence; {BY_HAND}."
+    )
+    legend_characters: int = setting(
+        96, "characters", "Names of this length in all fit side by side below a figure of a page's width, with their lines."
+    )
+    tick_characters: int = setting(
+        45, "characters", "Names that are longer together would touch each other along the axis of a figure: they are turned."
+    )
     no_width: float = setting(
         1e-5, "1", f"An interval whose ends differ by less than this share says nothing and is not shown; {BY_HAND}."
     )

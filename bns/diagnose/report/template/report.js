@@ -36,7 +36,9 @@
     }
     const [sx, sy] = on(place("measured", 0));
     make("circle", {cx: sx, cy: sy, r: 6, fill: "#fff", stroke: "#000", "stroke-width": 2}, floor);
-    make("text", {x: sx + 9, y: sy - 9, "font-size": 16}, floor).textContent = "start";
+    const turned = sx > width - 80;  // no room for the word to the right
+    make("text", {x: turned ? sx - 9 : sx + 9, y: sy - 9, "font-size": 16, "text-anchor": turned ? "end" : "start"}, floor)
+      .textContent = "start";
     return kinds.map(kind => [kind, make("circle", {r: 7, fill: looks[kind][0], stroke: "#fff", "stroke-width": 2}, floor), on]);
   }
 
