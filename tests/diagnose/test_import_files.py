@@ -294,6 +294,49 @@ def test_pauses_between_trials_are_not_driven_and_positions_far_apart_are_no_met
     assert guessed(in_mm).mapping["columns"]["left_m_s"] == {"from": "cmd_L"}
 
 
+@pytest.mark.parametrize(
+    ("size", "names", "factor", "unit"),
+    [
+        (100, ("v_left", "v_right"), 1.0, "cm"),
+        (1000, ("v_left", "v_right"), 1.0, "mm"),
+        (1000, ("cmd_l_mps", "cmd_r_mps"), 1.0, "mm"),
+        (100, ("left_cm_s", "right_cm_s"), 100.0, "cm"),
+        (100, ("left_rad_s", "right_rad_s"), 1.0, None),  # the radius of the wheels is not known, and may be anything
+        (1, ("v_left", "v_right"), 1.0, None),
+    ],
+)
+def test_positions_in_centimetres_and_millimetres_are_known_from_how_far_the_robot_went(table, size, names, factor, unit):
+    drives = dict(zip(names, (factor * table.left_m_s, factor * table.right_m_s), strict=True))
+    poses = {"x": size * table.x_m, "y": size * table.y_m, "yaw": table.heading_rad}
+    guess = guessed(pd.DataFrame({"trial": table.trial, "time": table.t_s, **drives, **poses}))
+    entries = guess.mapping["columns"]
+    assert (entries["x_m"], entries["y_m"]) == tuple({"from": name, **({"unit": unit} if unit else {})} for name in ("x", "y"))
+    said = [f"That the positions are in {unit} is guessed from how far the robot went: check it." in guess.remarks]
+    assert said == [unit is not None]
+    assert "scale" not in entries["left_m_s"] or not unit
+
+
+@pytest.mark.parametrize(
+    ("stands_s", "gap_s", "cut"),
+    [
+        (1.0, 0.0, {"standing_s": 1.0}),
+        (0.9, 0.0, {"lasting_s": 20.0}),
+        (0.0, 0.0, {"lasting_s": 20.0}),
+        (0.5, 3.0, {"gap_s": 2.0}),
+        (1.5, 3.0, {"standing_s": 1.0}),
+    ],
+)
+def test_a_log_without_trials_is_cut_at_what_it_has(stands_s, gap_s, cut):
+    """Two drives of five seconds; between them the robot stands, or nothing is recorded."""
+    first, last = np.arange(0.0, 5.0, 0.1), 5.0 + stands_s + gap_s + np.arange(0.0, 5.0, 0.1)
+    stood = 5.0 + 0.1 * np.arange(round(10 * stands_s))
+    t = np.concatenate([first, stood, last])
+    v = np.where((t >= 5.0) & (t < last[0]), 0.0, 0.1)
+    log = pd.DataFrame({"time": t, "v": v, "omega": 0.1 * (v > 0), "x": 0.1 * t, "y": 0.0, "yaw": 0.0})
+    assert guessed(log).mapping["trials"] == cut
+    assert guessed(log.drop(columns=["v", "omega"])).mapping["trials"] == {"standing_s": 1.0}
+
+
 @pytest.mark.parametrize("unit", [1.0, 180 / np.pi], ids=["rad", "deg"])
 @pytest.mark.parametrize(
     "convention",

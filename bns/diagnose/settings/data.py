@@ -202,6 +202,12 @@ class Data:
         "Positions that spread further are not taken for metres, and no unit of speeds is proposed from them; "
         f"{BY_HAND}.",
     )
+    guess_cuts: tuple[float, float, float] = setting(
+        (1.0, 2.0, 20.0),
+        "s",
+        "A log without trials is proposed to be cut where the robot is told to stand for so long (the first number), else at "
+        f"gaps longer than the second one, else into pieces that last the third one; {BY_HAND}.",
+    )
     guess_degrees: float = setting(
         90.0,
         "number",

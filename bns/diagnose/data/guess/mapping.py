@@ -11,7 +11,7 @@ import pandas as pd
 import yaml
 
 from bns.diagnose.data.guess.columns import METRES_A_COUNT, RADIUS, motions_of, of_columns, rank_of_commands
-from bns.diagnose.data.guess.numbers import SCALE, metres_a_unit
+from bns.diagnose.data.guess.numbers import LENGTHS, SCALE, cut_into_trials, metres_a_unit
 from bns.diagnose.data.guess.topics import of_topic_columns
 from bns.diagnose.data.guess.words import rank, unit_of, words_of
 from bns.diagnose.data.mapping import FORWARD, TURN
@@ -91,7 +91,7 @@ def guessed(table: pd.DataFrame, others: Mapping[str, pd.DataFrame] | None = Non
     if also or of_topics(table) or _apart(table, everything):
         tree["hold_commands_s"] = float("inf")
     if "trial" not in everything:
-        tree["trials"] = {"standing_s": 1}
+        tree["trials"] = cut_into_trials(tables[told or name], found[told or name])
     return Guess(tree, tuple(_remarks(everything, tables)), tuple(_blanks(everything, tables)))
 
 
@@ -172,6 +172,9 @@ def _remarks(entries: Entries, tables: Mapping[str, pd.DataFrame]) -> Iterator[s
     left = entries.get(COMMANDS[0], {})
     if "unit" in left and unit_of(words_of(str(left["from"]))) is None:
         yield f"That the commands are in {left['unit']} is guessed from how far the robot went: check it."
+    place = entries.get("x_m", {})
+    if place.get("unit") in LENGTHS and unit_of(words_of(str(place["from"]))) is None:
+        yield f"That the positions are in {place['unit']} is guessed from how far the robot went: check it."
     told = _names_of(entries, (*COMMANDS, FORWARD, TURN))
     if told and rank_of_commands(entries) < 0:
         yield "The speeds are measured, not commanded: effects of motors and controller (lag, limits) cannot show."

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from bns.diagnose.data.mapping import FORWARD, SIZES
+from bns.diagnose.data.mapping import FORWARD, SIZES, TURN
 from bns.diagnose.settings import DEFAULTS
 from bns.measurements import COMMANDS
 
 SCALE = "SCALE_M_S"
 """Stands where the speed is that one unit of a device stands for."""
 _SPEEDS = {name: SIZES[name] for name in ("m/s", "cm/s", "mm/s")}
+LENGTHS = {name: SIZES[name] for name in ("cm", "mm")}
 _WITHIN = DEFAULTS.data.guess_speed_within
 _LARGEST_M = DEFAULTS.data.guess_largest_m
 _WINDOW_S = DEFAULTS.data.guess_window_s
 _AGREE, _DISAGREE = DEFAULTS.data.guess_headings
+_STANDING, _GAP, _LASTING = DEFAULTS.data.guess_cuts
 
 
 def unit_of_speeds(table: pd.DataFrame, entries: Mapping[str, Any]) -> dict[str, Any]:
@@ -35,14 +38,50 @@ def unit_of_speeds(table: pd.DataFrame, entries: Mapping[str, Any]) -> dict[str,
     return {} if unit == "m/s" else {"unit": unit}
 
 
-def metres_a_unit(table: pd.DataFrame, entries: Mapping[str, Any]) -> float | None:
-    """How far the robot went, over what the two columns of commands add up to; None where that cannot be said."""
+def unit_of_positions(table: pd.DataFrame, entries: Mapping[str, Any]) -> dict[str, Any]:
+    """What entries for x and y lack where they have no unit: that of the poses of a robot that went 100 or 1000 times as far.
+
+    Taken for metres, such poses make one unit of the commands 100 m/s or more: no robot's commands are that coarse.
+    """
+    told = [entries.get(name, {}) for name in COMMANDS]
+    if any("unit" in entries.get(name, {}) for name in ("x_m", "y_m")) or any("scale" in entry for entry in told):
+        return {}
+    ratio = metres_a_unit(table, entries, np.inf)
+    if ratio is None:
+        return {}
+    ratio /= SIZES[told[0].get("unit", "m/s")]
+    unit = min(LENGTHS, key=lambda name: abs(np.log(ratio * LENGTHS[name])))
+    return {"unit": unit} if 1 / _WITHIN[0] < ratio * LENGTHS[unit] < _WITHIN[0] else {}
+
+
+def cut_into_trials(table: pd.DataFrame, entries: Mapping[str, Any]) -> dict[str, float]:
+    """How to cut a log without trials: where the robot is told to stand, at gaps in time, or into pieces, if it does neither.
+
+    Where it stands, if no column of the table says when or what it was told.
+    """
+    told = [name for name in (*COMMANDS, FORWARD, TURN) if name in entries]
+    numbers = _columns(table, entries, ("t_s", *told)) if told else None
+    if numbers is None or entries["t_s"].get("unit") == "date":
+        return {"standing_s": _STANDING}
+    t, *speeds = numbers
+    still = np.max([np.abs(np.nan_to_num(one)) for one in speeds], axis=0) == 0.0
+    turned = np.flatnonzero(np.diff(still.astype(int)))
+    if any(still[a + 1] and t[b] - t[a] >= _STANDING for a, b in pairwise(turned)):
+        return {"standing_s": _STANDING}
+    return {"gap_s": _GAP} if np.nanmax(np.diff(t), initial=0.0) > _GAP else {"lasting_s": _LASTING}
+
+
+def metres_a_unit(table: pd.DataFrame, entries: Mapping[str, Any], largest_m: float = _LARGEST_M) -> float | None:
+    """How far the robot went, over what the two columns of commands add up to; None where that cannot be said.
+
+    ``largest_m``: positions that spread further are not taken for metres.
+    """
     numbers = _columns(table, entries, ("t_s", "x_m", "y_m", *COMMANDS))
     if numbers is None:
         return None
     t, x, y, left, right = numbers
     good = np.isfinite(t) & np.isfinite(x) & np.isfinite(y)
-    if good.sum() < 3 or np.ptp(x[good]) > _LARGEST_M or np.ptp(y[good]) > _LARGEST_M:
+    if good.sum() < 3 or max(np.ptp(x[good]), np.ptp(y[good])) > largest_m:
         return None
     lasts = np.maximum(np.append(np.diff(t), 0.0), 0.0)
     way = np.concatenate([[0.0], np.cumsum(np.nan_to_num(np.abs(left + right) / 2) * lasts)[:-1]])
