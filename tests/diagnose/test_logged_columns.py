@@ -12,6 +12,7 @@ import pytest
 import bns
 from bns.cli.main import main
 from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report.text import diagnosis_text
@@ -124,6 +125,22 @@ def test_what_an_unlisted_verdict_says_of_a_column_holds_its_name_and_its_comman
     assert typed == f"bns add '{data}' loss --term 'k * load * v' --on v --model khepera -o NEW.yaml"
     assert main([*shlex.split(typed)[1:-1], str(tmp_path / "NEW.yaml")]) == 0
     assert bns.Model(tmp_path / "NEW.yaml").values_of("loss")["k"] == pytest.approx(-LOSS, abs=0.03)
+
+
+def test_a_term_that_was_fitted_beside_effects_is_tried_in_the_extended_model():
+    seen = WheelPredictor(tracks_of(measured(NOMINAL, trials=12)))
+    problem = problem_for(seen, NOMINAL)
+    found = diagnose(seen, NOMINAL)
+    beside = problem.fit(NOMINAL.with_effect("speed-gain", gain=1.05))
+    after = problem.fit(beside.model.with_active(formula_effect("loss", "k * v", "v"), (0.0,)))
+    hint = Formula("v", "k * v", after, problem.paired_comparison(beside, after), "loss", "")
+    selection = replace(found.selection, accepted=("speed-gain",), fit=beside)
+    words = {"data": "log.csv", "model": "--model khepera --more b.csv", "shared": "--more b.csv"}
+    for accepted, ending in (((), words["model"]), (selection.accepted, "--model EXTENDED.yaml --more b.csv")):
+        one = replace(found, formula=hint, terms=(), selection=replace(selection, accepted=accepted))
+        (line,) = (line for line in diagnosis_text(one, command=words).split("\n") if "bns add log.csv loss" in line)
+        assert line.endswith(f"bns add log.csv loss --term 'k * v' --on v {ending} -o NEW.yaml")
+        assert ("-o EXTENDED.yaml writes" in line) is bool(accepted)
 
 
 def test_a_column_whose_name_could_be_a_numbers_is_a_column_in_the_file_too():

@@ -12,6 +12,7 @@ from bns.diagnose.caveats import notes_on
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.fit_set import fit_set
+from bns.diagnose.estimate.parameters import FreeParameter
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import WheelPredictor
@@ -20,7 +21,15 @@ from bns.diagnose.residuals.symbolic import fitted
 from bns.diagnose.residuals.unexplained import NOTHING
 from bns.diagnose.select import negligible as negligible_module
 from bns.diagnose.select import result
-from bns.diagnose.select.negligible import LUCK, MEDIAN_OF, _largest_fall, fall_matters, negligible
+from bns.diagnose.select.negligible import (
+    LEAST_SHIFT,
+    LUCK,
+    MEDIAN_OF,
+    _largest_fall,
+    fall_matters,
+    negligible,
+    shifted,
+)
 from bns.diagnose.select.result import SelectionResult, certainly_lower
 from bns.diagnose.values import numbers_of
 from bns.physics.effects import effect_named
@@ -315,9 +324,11 @@ def test_numbers_that_what_is_negligible_moves_are_said():
 
 @pytest.mark.parametrize(("fall", "dropped"), [(0.0199, ("b",)), (0.02, ())])
 def test_an_effect_is_negligible_that_lowers_no_error_by_two_percent(monkeypatch, fall, dropped):
-    monkeypatch.setattr(negligible_module, "_without_each", lambda *_: None)
+    monkeypatch.setattr(negligible_module, "_without_each", lambda *_: dict.fromkeys(("all", "a", "b", "c")))
+    monkeypatch.setattr(negligible_module, "_errors_of", lambda *_: None)
+    monkeypatch.setattr(negligible_module, "shifted", lambda *_: ())
     monkeypatch.setattr(negligible_module, "_largest_fall", lambda _errors, name, _all: {"a": 0.5, "b": fall, "c": 0.3}[name])
-    assert negligible(SimpleNamespace(accepted=("a", "b", "c"))) == dropped
+    assert negligible(SimpleNamespace(accepted=("a", "b", "c"), problem=None)) == dropped
 
 
 @pytest.mark.parametrize(
@@ -337,3 +348,44 @@ def test_an_error_is_certainly_lower_that_falls_over_one_horizon_and_rises_over_
     one, other = ((SimpleNamespace(predictor="tracks", pose_filter=n), SimpleNamespace(model=n)) for n in (1, 2))
     assert certainly_lower(one, other) is lower
     assert seen == [("tracks", [("before", (1, 1)), ("after", (2, 2))])]
+
+
+@pytest.mark.parametrize(("moves", "dropped"), [((), ("b", "c")), (("b",), ("c",)), (("b", "c"), ())])
+def test_an_effect_without_which_another_ones_number_is_false_is_not_negligible(monkeypatch, moves, dropped):
+    monkeypatch.setattr(negligible_module, "_without_each", lambda _one, gone, kept: {n: n for n in ("all", *kept)})
+    monkeypatch.setattr(negligible_module, "_errors_of", lambda *_: None)
+    monkeypatch.setattr(negligible_module, "shifted", lambda having, lacking: (lacking,) if lacking in moves else ())
+    monkeypatch.setattr(negligible_module, "_largest_fall", lambda _errors, name, _all: {"a": 0.5, "b": 0.001, "c": 0.01}[name])
+    assert negligible(SimpleNamespace(accepted=("a", "b", "c"), problem=None)) == dropped
+
+
+def fitted_numbers(**effects):
+    """A fit of effects by name: value and half the width of the interval of each number, in the order of its parameters."""
+    numbers, values, halves = [], [], []
+    for name, pairs in effects.items():
+        for p, (value, half) in zip(effect_named(name.replace("_", "-")).parameters, pairs, strict=True):
+            numbers.append(FreeParameter(name, p))
+            values.append(value)
+            halves.append(half)
+    ends = [(value - half, value + half) for value, half in zip(values, halves, strict=True)]
+    return SimpleNamespace(free=tuple(numbers), values=np.array(values), interval=lambda i: ends[i])
+
+
+@pytest.mark.parametrize(
+    ("having", "lacking", "names"),
+    [
+        ({"dead_zone": [(0.0053, 1e-4)]}, {"dead_zone": [(0.0065, 1e-4)]}, ["width_m_s"]),  # by 23 %, for certain
+        ({"dead_zone": [(0.0053, 1e-4)]}, {"dead_zone": [(0.0065, 2e-3)]}, []),  # not for certain
+        ({"dead_zone": [(0.0053, 1e-6)]}, {"dead_zone": [(0.0057, 1e-6)]}, []),  # by 8 %
+        ({"speed_gain": [(1.05, 1e-4)]}, {"speed_gain": [(1.04, 1e-4)]}, ["gain"]),  # by a fifth of what it does
+        ({"speed_gain": [(1.05, 1e-4)]}, {"speed_gain": [(1.046, 1e-4)]}, []),
+        ({"speed_limit": [(0.2, 1e-4)]}, {"speed_limit": [(0.17, 1e-4)]}, ["max_m_s"]),
+        # the drift to the north is small beside that to the east
+        ({"floor_slope": [(0.01, 1e-5), (1e-4, 1e-5)]}, {"floor_slope": [(0.01, 1e-5), (2e-4, 1e-5)]}, []),
+        ({"floor_slope": [(0.01, 1e-5), (1e-4, 1e-5)]}, {"floor_slope": [(0.01, 1e-5), (2e-3, 1e-5)]}, ["y_m_s"]),
+        ({"speed_gain": [(1.05, 1e-4)], "dead_zone": [(0.01, 1e-4)]}, {"speed_gain": [(1.05, 1e-4)]}, []),
+    ],
+)
+def test_a_number_shifts_for_certain_and_by_a_tenth_of_what_its_effect_does(having, lacking, names):
+    assert LEAST_SHIFT == 0.1
+    assert [one.parameter.name for one in shifted(fitted_numbers(**having), fitted_numbers(**lacking))] == names

@@ -39,6 +39,7 @@ UNKNOWN_NOISE = (
 )
 _SHOWN = DEFAULTS.report.rows
 _WIDTH = DEFAULTS.report.formula_width
+_EXTENDED = "EXTENDED.yaml"
 
 
 def findings_text(findings: tuple[Finding, ...], most: int = 10) -> str:
@@ -86,7 +87,7 @@ def _diagnosis(d: Diagnosis, rivals: Sequence[Rival], command: Mapping[str, str]
             yield f"  {side} wheel: {value:.5g} of the drawing's size (95 %: {low:.5g} to {high:.5g})"
     yield from _terms(d)
     if d.formula is not None and not d.terms:
-        yield from _hint(d.formula, d.formula_in_words, command)
+        yield from _hint(d.formula, d.formula_in_words, command, bool(d.effects))
     notes = [note for note in further_notes(d) if note not in odd]
     if notes:
         yield "\nnotes:"
@@ -158,13 +159,20 @@ def _terms(d: Diagnosis) -> Iterator[str]:
         )
 
 
-def _hint(formula: Formula, words: str, command: Mapping[str, str]) -> Iterator[str]:
-    """A formula that is no part of the extended model: what it says, and the command that adds it."""
+def _hint(formula: Formula, words: str, command: Mapping[str, str], beside: bool) -> Iterator[str]:
+    """A formula that is no part of the extended model: what it says, and the command that adds it.
+
+    ``beside``: it was fitted beside effects, and says nothing of a model that lacks them.
+    """
     said = f"{words};\n  " if words else ""
     yield f"\nhint, not part of the extended model: {said}candidate term {formula.name}, added to {formula.on}: {formula.term}"
     yield from _intervals({formula.name: numbers_of_term(formula)})
     term = f"{formula.name} --term {shlex.quote(formula.term)} --on {formula.on}"
-    yield f"    to try it: bns add {command['data']} {term} {command['model']} -o NEW.yaml"
+    first, model = "to try it", command["model"]
+    if beside:
+        first = f"to try it beside the effects, in the model that -o {_EXTENDED} writes"
+        model = f"--model {_EXTENDED} {command.get('shared', '')}".strip()
+    yield f"    {first}: bns add {command['data']} {term} {model} -o NEW.yaml"
 
 
 def _intervals(values: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> Iterator[str]:

@@ -337,12 +337,16 @@ def _exchanged(
 
 
 def _least_share_m(predictor: Predictor, effects: _State, bare: Fit, terms: Fit) -> float:
-    """As `_share`, of the root mean square error on held-out trials, at the horizon where it is least."""
+    """As `_share`, of the root mean square error on held-out trials, at the horizon where it is least.
+
+    Only where the terms' error is certainly lower than the effects': over few long windows it differs by luck.
+    """
     fits = {"bare": bare, "effects": effects.fit, "terms": terms}
     pose_filter = effects.problem.pose_filter
     errors = paired_errors(predictor, [(name, held_out_steps(predictor, pose_filter, f.model)) for name, f in fits.items()])
     without, by_effects, by_terms = (errors.of(name) for name in fits)
-    falls = [(without[h].rms_m - by_effects[h].rms_m, without[h].rms_m - by_terms[h].rms_m) for h in errors.horizons]
+    surely = [h for h, at in errors.horizons.items() if at.change_between("effects", "terms").fell]
+    falls = [(without[h].rms_m - by_effects[h].rms_m, without[h].rms_m - by_terms[h].rms_m) for h in surely]
     return min((one / other for one, other in falls if other > 0), default=1.0)
 
 

@@ -1,17 +1,19 @@
 """Accepted effects that are certain and matter to no prediction: a clock that is half a millisecond late, for example.
 
 Many poses make an effect certain long before it is of use. A user reads a named effect as a fault of the model, and looks for it
-in the robot; one that changes no error that can be seen is not worth that.
+in the robot; one that changes no error that can be seen is not worth that. It is, if without it the number of another effect
+is a false one: a gain of 0.99 that is left out makes a dead zone of 5 mm/s one of 6.5.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from bns.diagnose.estimate.cross_validation import held_out_steps
 from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.parameters import FreeParameter
 from bns.diagnose.predict.paired_errors import PairedErrors, paired_errors
 from bns.diagnose.select.result import SelectionResult
 from bns.diagnose.settings import DEFAULTS
@@ -19,23 +21,26 @@ from bns.diagnose.settings import DEFAULTS
 LEAST_FALL = DEFAULTS.select.least_fall
 LUCK = DEFAULTS.select.least_fall_luck
 MEDIAN_OF = DEFAULTS.select.least_fall_windows
+LEAST_SHIFT = DEFAULTS.select.least_shift
 _ALL = "all"
 
 
 def negligible(selection: SelectionResult, fewest: int = 1) -> tuple[str, ...]:
     """Accepted effects without which no held-out error is higher by `least_fall`, at any horizon; the least first.
 
-    Each is judged beside all that are kept, so of two that can stand for one another one is kept. The last ``fewest`` are not
-    judged: an effect alone has been, by the errors of the model as given.
+    Nor does the number of another one change by `least_shift`, for certain. Each is judged beside all that are kept, so of two
+    that can stand for one another one is kept. The last ``fewest`` are not judged: an effect alone has been, by the errors of the
+    model as given.
     """
     dropped: tuple[str, ...] = ()
     while len(kept := tuple(name for name in selection.accepted if name not in dropped)) > fewest:
-        errors = _without_each(selection, dropped, kept)
+        fits = _without_each(selection, dropped, kept)
+        errors = _errors_of(selection.problem, fits)
         falls = {name: _largest_fall(errors, name, _ALL) for name in kept}
-        least = min(falls, key=lambda name: falls[name])
-        if falls[least] >= LEAST_FALL:
+        tiny = [name for name in kept if falls[name] < LEAST_FALL and not shifted(fits[_ALL], fits[name])]
+        if not tiny:
             break
-        dropped = (*dropped, least)
+        dropped = (*dropped, min(tiny, key=lambda name: falls[name]))
     return dropped
 
 
@@ -59,14 +64,49 @@ def certainly_better(lacking: tuple[Problem, Fit], having: tuple[Problem, Fit]) 
     return fall_matters(paired_errors(predictor, steps), "lacking", _ALL)
 
 
-def _without_each(selection: SelectionResult, dropped: Sequence[str], kept: Sequence[str]) -> PairedErrors:
+def shifted(having: Fit, lacking: Fit) -> tuple[FreeParameter, ...]:
+    """Numbers of effects that both models have and that differ for certain: each lies outside of the other one's interval.
+
+    By `least_shift` of what the effect does: of the largest distance of its numbers with that unit from those of no effect.
+    """
+    others = {number: index for index, number in enumerate(lacking.free)}
+    sizes: dict[tuple[str, str], float] = {}
+    for number, value in zip(having.free, having.values, strict=True):
+        key = number.effect, number.parameter.unit
+        sizes[key] = max(sizes.get(key, 0.0), _size(number, float(value)))
+    found = []
+    for index, number in enumerate(having.free):
+        if (at := others.get(number)) is None:
+            continue
+        value, other = float(having.values[index]), float(lacking.values[at])
+        apart = not (_within(other, having.interval(index)) or _within(value, lacking.interval(at)))
+        if apart and abs(other - value) >= LEAST_SHIFT * sizes[number.effect, number.parameter.unit]:
+            found.append(number)
+    return tuple(found)
+
+
+def _size(number: FreeParameter, value: float) -> float:
+    """How far a number is from where its effect does nothing; of a limit, which then is infinite, how large it is."""
+    neutral = number.parameter.neutral
+    return abs(value - neutral) if np.isfinite(neutral) else abs(value)
+
+
+def _within(value: float, interval: tuple[float, float]) -> bool:
+    return interval[0] <= value <= interval[1]
+
+
+def _without_each(selection: SelectionResult, dropped: Sequence[str], kept: Sequence[str]) -> dict[str, Fit]:
+    """The fit with all that are kept, and those that lack one of them, by its name."""
     problem, model = selection.problem, selection.fit.model
     for name in dropped:
         model = model.without(name)
-    models = [(_ALL, model)] + [(name, model.without(name)) for name in kept]
-    fits = [(name, problem.fit(one, nearby=selection.fit.jacobian_by_parameter).model) for name, one in models]
-    predictor = problem.predictor
-    return paired_errors(predictor, [(name, held_out_steps(predictor, problem.pose_filter, m)) for name, m in fits])
+    models = {_ALL: model, **{name: model.without(name) for name in kept}}
+    return {name: problem.fit(one, nearby=selection.fit.jacobian_by_parameter) for name, one in models.items()}
+
+
+def _errors_of(problem: Problem, fits: Mapping[str, Fit]) -> PairedErrors:
+    steps = [(name, held_out_steps(problem.predictor, problem.pose_filter, fit.model)) for name, fit in fits.items()]
+    return paired_errors(problem.predictor, steps)
 
 
 def _largest_fall(errors: PairedErrors, before: str, after: str) -> float:
