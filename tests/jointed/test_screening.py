@@ -130,7 +130,9 @@ def test_an_effect_that_changes_nothing_or_cannot_be_computed_is_worth_nothing(c
         ("torque-limit", [0.1**0.6]),
         ("joint-zero-joint5", [0.24]),
         ("weak-joint-joint5", [0.4, 0.0]),
-        ("servo-delay", [0.24]),
+        ("servo-delay", [0.24, -0.01, 0.02]),
+        ("dead-band", [0.09, 0.03]),
+        ("joint-zero-joint0", [0.24]),
     ],
 )
 def test_effects_are_screened_well_inside_of_what_is_plausible_and_where_robots_reach_a_bound(name, ways):

@@ -103,6 +103,19 @@ def _ways(effect: Effect) -> Iterator[tuple[float, ...]]:
     if len(numbers) == 1:
         for bound in numbers[0].reached:
             yield (bound,)
+        if numbers[0].neutral == 0.0:
+            yield from _nearest(effect)
+
+
+def _nearest(effect: Effect) -> Iterator[tuple[float, ...]]:
+    """Of the starts of a number that is added, the nearest to nothing on each side.
+
+    A delay that is long for fast commands leaves nothing of them to compare: the slope towards it says nothing of a short one.
+    """
+    for side in (-1, 1):
+        away = [side * value for (value,) in effect.starts if side * value > 0]
+        if away:
+            yield (side * min(away),)
 
 
 def _scored_at(few: Problem, base: Fit, effect: Effect, values: tuple[float, ...]) -> Screened:

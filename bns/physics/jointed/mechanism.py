@@ -19,6 +19,13 @@ from bns.physics.jointed.plant import Plant, sound
 mujoco = deferred("snake", "mujoco")
 
 
+def _heard(_: str) -> None:
+    """What MuJoCo warns of: a simulation that is unstable. Its own handler writes a file of any size into the working directory.
+
+    Numbers far from those of the robot are tried, and what cannot be simulated there predicts nothing.
+    """
+
+
 @dataclass(frozen=True)
 class Mechanism:
     """A body as text and numbers.
@@ -89,17 +96,34 @@ class Machine:
         return np.maximum(bodies[self.model.pair_geom1], bodies[self.model.pair_geom2]).astype(np.int64)
 
     @property
+    def limits_inside(self) -> bool:
+        """Does MuJoCo bound the servos' torques, within its steps and after their damping, as the file says?
+
+        Without damping, and with forces worked out once a step, it is the same to bound the servos' errors between steps.
+        """
+        damped = bool(self.model.actuator_biasprm[:, 2].any())
+        return damped or int(self.model.opt.integrator) == int(mujoco.mjtIntegrator.mjINT_RK4)
+
+    @property
     def plant(self) -> Plant:
         """Nothing wrong."""
         return sound(self.joints, self.model.nbody - 1)
 
     def changed(self, plant: Plant) -> Any:
-        """The MuJoCo model with the masses, the friction and the servos' damping of a plant."""
+        """The MuJoCo model with the masses, the friction and the servos' damping of a plant.
+
+        And with their stiffness and torque, where it bounds them itself (`limits_inside`).
+        """
         same = plant.friction_along == plant.friction_across == 1.0
-        if same and all((factors == 1.0).all() for factors in (plant.mass, plant.grip, plant.damping)):
+        servos = (plant.damping, *((plant.stiffness, plant.torque) if self.limits_inside else ()))
+        if same and all((factors == 1.0).all() for factors in (plant.mass, plant.grip, *servos)):
             return self.model
         model = _copy(self.model)
         model.actuator_biasprm[:, 2] *= plant.damping
+        if self.limits_inside:
+            model.actuator_gainprm[:, 0] *= plant.stiffness
+            model.actuator_biasprm[:, 1] *= plant.stiffness
+            model.actuator_forcerange *= plant.torque[:, None]
         model.body_mass[1:] *= plant.mass
         model.body_inertia[1:] *= plant.mass[:, None]
         grip = np.concatenate([[1.0], plant.grip])[self.pair_links]
@@ -116,6 +140,7 @@ def _copy(model: Any) -> Any:
 @lru_cache(maxsize=32)
 def machine(mechanism: Mechanism, dt_s: float | None = None) -> Machine:
     """The compiled mechanism, with steps of ``dt_s`` instead of its own; ModelError for a body that cannot be used here."""
+    mujoco.set_mju_user_warning(_heard)
     try:
         spec = mujoco.MjSpec.from_string(mechanism.xml)
         _name(spec)

@@ -218,6 +218,7 @@ class _Servos:
         self._stiffness = p.stiffness
         self._furthest = m.torque_n_m * p.torque / m.stiffness_n_m_rad
         self._sag = p.sag
+        self._inside = m.limits_inside
         self._reach = p.speed * told_rad_s * dt_s if (p.speed < 1).any() else None
         self._now = self._wanted[:, 0].copy()
 
@@ -230,11 +231,13 @@ class _Servos:
             wanted = self._now[:n]
         error = wanted - q
         error[np.abs(error) < self._band] = 0.0
-        error = np.clip(self._stiffness * error, -self._furthest, self._furthest)
+        bounded = np.clip(self._stiffness * error, -self._furthest, self._furthest)
         if self._sag:
-            load = np.abs(error / np.maximum(self._furthest, 1e-12)).mean(axis=1, keepdims=True)
-            error = error * (1.0 - self._sag * load)
-        out: Array = q + error
+            load = np.abs(bounded / np.maximum(self._furthest, 1e-12)).mean(axis=1, keepdims=True)
+            bounded = bounded * (1.0 - self._sag * load)
+        if self._inside:  # the model itself has the plant's stiffness and torque
+            bounded = error if not self._sag else bounded / np.maximum(self._stiffness, 1e-12)
+        out: Array = q + bounded
         return out
 
 

@@ -23,6 +23,6 @@ EFFECT = Effect(
     sentence="the servos follow with a longer delay than in the model",
     sized="the servos follow with a delay that is {delay_s:longer|shorter} than in the model",
     measurement="film a servo together with an LED that shows traffic on its bus",
-    starts=((-0.01,), (0.08,), (0.24,)),
+    starts=((-0.01,), (0.02,), (0.08,), (0.24,)),
     apply=apply,
 )
