@@ -222,6 +222,9 @@ def test_an_effect_is_shown_with_all_that_is_known_of_it(capsys):
     assert [one["of"] for one in answer(capsys, "effects", "floor-slope", "--json")] == ["wheels", "bodies on joints"]
     assert main(["effects", "weak-joint"]) == 0
     assert "of: bodies on joints" in capsys.readouterr().out
+    assert answer(capsys, "effects", "weak-joint-elbow", "--json") == answer(capsys, "effects", "weak-joint", "--json")
+    assert main(["effects", "floor-slope-elbow"]) == 2  # a floor is of no joint
+    capsys.readouterr()
     assert main(["effects", "motor-lg"]) == 2
     assert "Did you mean 'motor-lag'?" in capsys.readouterr().err
 

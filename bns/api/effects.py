@@ -42,6 +42,9 @@ def described(name: str) -> list[dict[str, str]]:
         ModelError: there is no such effect.
     """
     wheels, joints = all_effects(), joint_names()
+    if name not in {*wheels, *joints}:  # weak-joint-elbow: of one joint, link or point of a robot that is not at hand
+        whole = (one for one in joints if name.startswith(f"{one}-") and hasattr(JOINT_EFFECTS.load(one), "anywhere"))
+        name = max(whole, key=len, default=name)
     found = [("wheels", wheels[name])] if name in wheels else []
     part = JOINT_EFFECTS.load(name) if name in joints else None  # one for the body, or one for each joint, link or point
     found += [("bodies on joints", getattr(part, "anywhere", part))] if part is not None else []

@@ -259,6 +259,13 @@ def test_a_log_in_other_units_is_refused_with_the_column(tmp_path, changed, said
         bns.compare(changed(table), model)
 
 
+def test_a_comparison_of_a_body_says_why_its_noise_is_not_known(tmp_path):
+    (tmp_path / "arm.xml").write_text(xml())
+    said = bns.compare(log(1), bns.Model(tmp_path / "arm.xml")).summary()
+    assert "(noise not known: of a body only the ends of a stretch are compared)" in said
+    assert "tracking noise alone" not in said
+
+
 def test_a_log_of_joints_is_none_of_wheels_and_needs_no_import(tmp_path, capsys):
     with pytest.raises(DataError, match="holds set points of joints, and the model khepera drives wheels"):
         bns.compare(log(1), "khepera")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -204,6 +204,11 @@ def _whose(errors: PairedErrors) -> str:
     return "held-out trials" if errors.trials > 1 else "the one trial, to which the numbers were fitted (none is held out)"
 
 
+def _why_unknown(horizons: Iterable[str]) -> str:
+    """Why the noise of the tracker is not known, where it is not."""
+    return "of a body only the ends of a stretch are compared" if {"cycle", "stretch"} & set(horizons) else UNKNOWN_NOISE
+
+
 def error_lines(errors: PairedErrors, before_added: str = "") -> Iterator[str]:
     """A table of the errors of models in turn, one row a horizon and model, with the change from the one before.
 
@@ -223,9 +228,7 @@ def error_lines(errors: PairedErrors, before_added: str = "") -> Iterator[str]:
         left_out = ", ".join(f"{e.left_out} at {h}" for h, e in errors.horizons.items() if e.left_out)
         yield f"  (windows excluded because the tracker jumps within them or poses were left out: {left_out})"
     if errors.noise is None:
-        of_body = {"cycle", "stretch"} & set(errors.horizons)
-        why = "of a body only the ends of a stretch are compared" if of_body else UNKNOWN_NOISE
-        yield f"  (noise not known: {why})"
+        yield f"  (noise not known: {_why_unknown(errors.horizons)})"
     else:
         pose_mm, basis = 1e3 * errors.noise.position_m, errors.noise.basis
         of = {"at rest": "poses at rest", "high frequency": "poses at high frequency"}.get(basis, basis)
@@ -278,8 +281,11 @@ def _comparison(c: Comparison) -> Iterator[str]:
                 f"  {horizon:10}{1e3 * e['position_m']:8.2f}{scatter}{1e3 * e['forward_m']:10.2f}"
                 f"{1e3 * e['left_m']:10.2f}{57.29578 * e['heading_rad']:13.2f}{noise}{e['windows']:9.0f}"
             )
-    least = ", at least" if c.judged.noise is not None and c.judged.noise.is_lower_bound else ""
-    yield f"  (noise: error that tracking noise alone would cause{least}; the scatter of the drive is not included)"
+    if c.judged.noise is None:
+        yield f"  (noise not known: {_why_unknown(c.errors)})"
+    else:
+        least = ", at least" if c.judged.noise.is_lower_bound else ""
+        yield f"  (noise: error that tracking noise alone would cause{least}; the scatter of the drive is not included)"
     if c.hint:
         yield f"  {c.hint}"
     yield "\nwhere it fails: fraction of the loss that a free curve along each variable would remove, on held-out trials:"
