@@ -317,6 +317,17 @@ def test_positions_in_centimetres_and_millimetres_are_known_from_how_far_the_rob
 
 
 @pytest.mark.parametrize(
+    ("size", "factor", "place", "speed"),
+    [(1000, 1.0, {"unit": "mm"}, {}), (1, 100.0, {}, {"unit": "cm/s"}), (1, 1.0, {}, {}), (1, 37.0, {}, {})],
+)
+def test_units_of_a_robot_that_is_told_how_fast_to_go_forward(table, size, factor, place, speed):
+    v = factor * (table.left_m_s + table.right_m_s) / 2
+    poses = {"x": size * table.x_m, "y": size * table.y_m, "yaw": table.heading_rad}
+    entries = guessed(pd.DataFrame({"trial": table.trial, "time": table.t_s, "v": v, "omega": 0.1, **poses})).mapping["columns"]
+    assert (entries["x_m"], entries["forward_m_s"]) == ({"from": "x", **place}, {"from": "v", **speed})
+
+
+@pytest.mark.parametrize(
     ("stands_s", "gap_s", "cut"),
     [
         (1.0, 0.0, {"standing_s": 1.0}),

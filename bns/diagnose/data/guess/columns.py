@@ -48,7 +48,8 @@ def of_columns(table: pd.DataFrame) -> dict[str, Any]:
     entries |= {name: {**entries[name], **lengths} for name in ("x_m", "y_m") if lengths}
     by_numbers = unit_of_speeds(table, entries)
     counted_from = heading_convention(table, entries)
-    more = {**dict.fromkeys(COMMANDS, by_numbers), "heading_rad": counted_from}
+    forward = {} if "scale" in by_numbers else by_numbers  # a robot's own units are those of its motors
+    more = {**dict.fromkeys(COMMANDS, by_numbers), FORWARD: forward, "heading_rad": counted_from}
     return {name: {**entry, **more.get(name, {})} for name, entry in entries.items()}
 
 

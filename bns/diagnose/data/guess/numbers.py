@@ -25,8 +25,8 @@ _STANDING, _GAP, _LASTING = DEFAULTS.data.guess_cuts
 
 
 def unit_of_speeds(table: pd.DataFrame, entries: Mapping[str, Any]) -> dict[str, Any]:
-    """What an entry for a wheel's speed lacks: a unit, a scale to be filled in, or nothing (metres per second, or not known)."""
-    if any({"unit", "scale"} & set(entries[name]) for name in COMMANDS if name in entries):
+    """What an entry for a speed of a wheel, or forward, lacks: a unit, a scale to be filled in, or nothing (m/s, or unknown)."""
+    if any({"unit", "scale"} & set(entries[name]) for name in (*COMMANDS, FORWARD) if name in entries):
         return {}
     ratio = metres_a_unit(table, entries)
     if ratio is None:
@@ -43,8 +43,8 @@ def unit_of_positions(table: pd.DataFrame, entries: Mapping[str, Any]) -> dict[s
 
     Taken for metres, such poses make one unit of the commands 100 m/s or more: no robot's commands are that coarse.
     """
-    told = [entries.get(name, {}) for name in COMMANDS]
-    if any("unit" in entries.get(name, {}) for name in ("x_m", "y_m")) or any("scale" in entry for entry in told):
+    told = [entries[name] for name in (*COMMANDS, FORWARD) if name in entries]
+    if not told or any("unit" in entries.get(name, {}) for name in ("x_m", "y_m")) or any("scale" in entry for entry in told):
         return {}
     ratio = metres_a_unit(table, entries, np.inf)
     if ratio is None:
@@ -72,19 +72,20 @@ def cut_into_trials(table: pd.DataFrame, entries: Mapping[str, Any]) -> dict[str
 
 
 def metres_a_unit(table: pd.DataFrame, entries: Mapping[str, Any], largest_m: float = _LARGEST_M) -> float | None:
-    """How far the robot went, over what the two columns of commands add up to; None where that cannot be said.
+    """How far the robot went, over what the commands (of both wheels, or forward) add up to; None where that cannot be said.
 
     ``largest_m``: positions that spread further are not taken for metres.
     """
-    numbers = _columns(table, entries, ("t_s", "x_m", "y_m", *COMMANDS))
+    told = COMMANDS if set(COMMANDS) <= set(entries) else (FORWARD,)
+    numbers = _columns(table, entries, ("t_s", "x_m", "y_m", *told))
     if numbers is None:
         return None
-    t, x, y, left, right = numbers
+    t, x, y, *speeds = numbers
     good = np.isfinite(t) & np.isfinite(x) & np.isfinite(y)
     if good.sum() < 3 or max(np.ptp(x[good]), np.ptp(y[good])) > largest_m:
         return None
     lasts = np.maximum(np.append(np.diff(t), 0.0), 0.0)
-    way = np.concatenate([[0.0], np.cumsum(np.nan_to_num(np.abs(left + right) / 2) * lasts)[:-1]])
+    way = np.concatenate([[0.0], np.cumsum(np.nan_to_num(np.abs(np.mean(speeds, axis=0))) * lasts)[:-1]])
     every = max(round(_WINDOW_S / np.median(lasts[lasts > 0])), 1) if (lasts > 0).any() else 1
     at = np.flatnonzero(good)[::every]
     a, b = at[:-1], at[1:]
@@ -130,7 +131,7 @@ def _columns(table: pd.DataFrame, entries: Mapping[str, Any], names: tuple[str, 
     """These columns in SI units, the commands as they are; None where one is missing or is made of several."""
     if not set(names) <= set(entries) or any(not isinstance(entries[name]["from"], str) for name in names):
         return None
-    return [_in_si(table, entries[name], name not in COMMANDS) for name in names]
+    return [_in_si(table, entries[name], name not in {*COMMANDS, FORWARD}) for name in names]
 
 
 def _in_si(table: pd.DataFrame, entry: Mapping[str, Any], with_unit: bool) -> np.ndarray:
