@@ -350,11 +350,23 @@ def test_an_error_is_certainly_lower_that_falls_over_one_horizon_and_rises_over_
     assert seen == [("tracks", [("before", (1, 1)), ("after", (2, 2))])]
 
 
-@pytest.mark.parametrize(("moves", "dropped"), [((), ("b", "c")), (("b",), ("c",)), (("b", "c"), ())])
-def test_an_effect_without_which_another_ones_number_is_false_is_not_negligible(monkeypatch, moves, dropped):
+MOVES = {
+    "nothing": {},
+    "b moves a": {"b": "a"},
+    "both move a": {"b": "a", "c": "a"},
+    "b and c move each other": {"b": "c", "c": "b"},
+}
+
+
+@pytest.mark.parametrize(
+    ("moves", "dropped"),
+    [("nothing", ("b", "c")), ("b moves a", ("c",)), ("both move a", ()), ("b and c move each other", ("b", "c"))],
+)
+def test_an_effect_without_which_a_number_that_matters_is_false_is_not_negligible(monkeypatch, moves, dropped):
+    of = MOVES[moves]
     monkeypatch.setattr(negligible_module, "_without_each", lambda _one, gone, kept: {n: n for n in ("all", *kept)})
     monkeypatch.setattr(negligible_module, "_errors_of", lambda *_: None)
-    monkeypatch.setattr(negligible_module, "shifted", lambda having, lacking: (lacking,) if lacking in moves else ())
+    monkeypatch.setattr(negligible_module, "shifted", lambda _, lacking, firm: {of[lacking]} & firm if lacking in of else ())
     monkeypatch.setattr(negligible_module, "_largest_fall", lambda _errors, name, _all: {"a": 0.5, "b": 0.001, "c": 0.01}[name])
     assert negligible(SimpleNamespace(accepted=("a", "b", "c"), problem=None)) == dropped
 
@@ -384,8 +396,11 @@ def fitted_numbers(**effects):
         ({"floor_slope": [(0.01, 1e-5), (1e-4, 1e-5)]}, {"floor_slope": [(0.01, 1e-5), (2e-4, 1e-5)]}, []),
         ({"floor_slope": [(0.01, 1e-5), (1e-4, 1e-5)]}, {"floor_slope": [(0.01, 1e-5), (2e-3, 1e-5)]}, ["y_m_s"]),
         ({"speed_gain": [(1.05, 1e-4)], "dead_zone": [(0.01, 1e-4)]}, {"speed_gain": [(1.05, 1e-4)]}, []),
+        ({"dead_zone": [(0.0053, 0.0)]}, {"dead_zone": [(0.0065, 1e-4)]}, []),  # an interval without width says nothing
+        ({"wheelbase": [(1.05, 1e-4)]}, {"wheelbase": [(1.1, 1e-4)]}, []),  # not one of those that are asked about
     ],
 )
 def test_a_number_shifts_for_certain_and_by_a_tenth_of_what_its_effect_does(having, lacking, names):
     assert LEAST_SHIFT == 0.1
-    assert [one.parameter.name for one in shifted(fitted_numbers(**having), fitted_numbers(**lacking))] == names
+    asked = {"dead_zone", "speed_gain", "speed_limit", "floor_slope"}
+    assert [one.parameter.name for one in shifted(fitted_numbers(**having), fitted_numbers(**lacking), asked)] == names

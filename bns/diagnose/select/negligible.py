@@ -7,7 +7,8 @@ is a false one: a gain of 0.99 that is left out makes a dead zone of 5 mm/s one 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -22,22 +23,24 @@ LEAST_FALL = DEFAULTS.select.least_fall
 LUCK = DEFAULTS.select.least_fall_luck
 MEDIAN_OF = DEFAULTS.select.least_fall_windows
 LEAST_SHIFT = DEFAULTS.select.least_shift
+_NO_WIDTH = DEFAULTS.report.no_width
 _ALL = "all"
 
 
 def negligible(selection: SelectionResult, fewest: int = 1) -> tuple[str, ...]:
     """Accepted effects without which no held-out error is higher by `least_fall`, at any horizon; the least first.
 
-    Nor does the number of another one change by `least_shift`, for certain. Each is judged beside all that are kept, so of two
-    that can stand for one another one is kept. The last ``fewest`` are not judged: an effect alone has been, by the errors of the
-    model as given.
+    Nor does a number of one that is not negligible itself change by `least_shift`, for certain. Each is judged beside all that
+    are kept, so of two that can stand for one another one is kept. The last ``fewest`` are not judged: an effect alone has been,
+    by the errors of the model as given.
     """
     dropped: tuple[str, ...] = ()
     while len(kept := tuple(name for name in selection.accepted if name not in dropped)) > fewest:
         fits = _without_each(selection, dropped, kept)
         errors = _errors_of(selection.problem, fits)
         falls = {name: _largest_fall(errors, name, _ALL) for name in kept}
-        tiny = [name for name in kept if falls[name] < LEAST_FALL and not shifted(fits[_ALL], fits[name])]
+        firm = {name for name in kept if falls[name] >= LEAST_FALL}
+        tiny = [name for name in kept if name not in firm and not shifted(fits[_ALL], fits[name], firm)]
         if not tiny:
             break
         dropped = (*dropped, min(tiny, key=lambda name: falls[name]))
@@ -64,8 +67,8 @@ def certainly_better(lacking: tuple[Problem, Fit], having: tuple[Problem, Fit]) 
     return fall_matters(paired_errors(predictor, steps), "lacking", _ALL)
 
 
-def shifted(having: Fit, lacking: Fit) -> tuple[FreeParameter, ...]:
-    """Numbers of effects that both models have and that differ for certain: each lies outside of the other one's interval.
+def shifted(having: Fit, lacking: Fit, effects: Collection[str]) -> tuple[FreeParameter, ...]:
+    """Numbers of these effects that differ for certain from model to model: each lies outside of the other one's interval.
 
     By `least_shift` of what the effect does: of the largest distance of its numbers with that unit from those of no effect.
     """
@@ -76,7 +79,8 @@ def shifted(having: Fit, lacking: Fit) -> tuple[FreeParameter, ...]:
         sizes[key] = max(sizes.get(key, 0.0), _size(number, float(value)))
     found = []
     for index, number in enumerate(having.free):
-        if (at := others.get(number)) is None:
+        at = others.get(number)
+        if at is None or number.effect not in effects:
             continue
         value, other = float(having.values[index]), float(lacking.values[at])
         apart = not (_within(other, having.interval(index)) or _within(value, lacking.interval(at)))
@@ -92,7 +96,9 @@ def _size(number: FreeParameter, value: float) -> float:
 
 
 def _within(value: float, interval: tuple[float, float]) -> bool:
-    return interval[0] <= value <= interval[1]
+    """So it is said to be where the interval has no width, and says nothing."""
+    low, high = interval
+    return math.isclose(low, high, rel_tol=_NO_WIDTH) or low <= value <= high
 
 
 def _without_each(selection: SelectionResult, dropped: Sequence[str], kept: Sequence[str]) -> dict[str, Fit]:
