@@ -15,6 +15,7 @@ from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.parameters import FreeParameter
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report.text import _effects_but, _with_interval, diagnosis_text, enumerated
+from bns.diagnose.residuals import established as established_module
 from bns.diagnose.residuals.outliers import Outlier
 from bns.diagnose.residuals.unexplained import Unexplained
 from bns.diagnose.select import result
@@ -311,3 +312,32 @@ def test_where_an_effect_only_imitates_the_simpler_one_that_it_extends_is_asked_
         outcome.outcome_of(searched, late, NOMINAL, lambda _: None)
         assert asked[-2:] == [searched.accepted, shorter.accepted]
         assert seen[-1] == accepted
+
+
+@pytest.mark.parametrize(
+    ("certain", "share"),
+    [((True, True), 0.5), ((True, False), 0.8), ((False, True), 0.5), ((False, False), 1.0)],
+)
+def test_a_curve_that_predicts_better_by_luck_does_not_bar_an_effect(monkeypatch, certain, share):
+    """Near, the effect takes away 0.8 of what the curve takes away, far 0.5; each counts where the difference is certain."""
+    rms_m = {"near": {"bare": 0.02, "effects": 0.012, "terms": 0.01}, "far": {"bare": 0.1, "effects": 0.09, "terms": 0.08}}
+
+    def errors_of(_, judged):
+        assert [name for name, _ in judged] == ["bare", "effects", "terms"]
+        changes = dict(zip(rms_m, certain, strict=True))
+        return SimpleNamespace(
+            horizons={
+                h: SimpleNamespace(change_between=lambda *names, h=h: SimpleNamespace(fell=names == PAIR and changes[h]))
+                for h in rms_m
+            },
+            of=lambda name: {h: SimpleNamespace(rms_m=by_model[name]) for h, by_model in rms_m.items()},
+        )
+
+    monkeypatch.setattr(established_module, "paired_errors", errors_of)
+    monkeypatch.setattr(established_module, "held_out_steps", lambda *_: None)
+    fit = SimpleNamespace(model=None)
+    effects = SimpleNamespace(fit=fit, problem=SimpleNamespace(pose_filter=None))
+    assert established_module._least_share_m(None, effects, fit, fit) == pytest.approx(share)
+
+
+PAIR = ("effects", "terms")
