@@ -71,10 +71,10 @@ def cut_into_trials(table: pd.DataFrame, entries: Mapping[str, Any]) -> dict[str
     return {"gap_s": _GAP} if np.nanmax(np.diff(t), initial=0.0) > _GAP else {"lasting_s": _LASTING}
 
 
-def metres_a_unit(table: pd.DataFrame, entries: Mapping[str, Any], largest_m: float = _LARGEST_M) -> float | None:
+def metres_a_unit(table: pd.DataFrame, entries: Mapping[str, Any], largest_m: float | None = None) -> float | None:
     """How far the robot went, over what the commands (of both wheels, or forward) add up to; None where that cannot be said.
 
-    ``largest_m``: positions that spread further are not taken for metres.
+    ``largest_m``: positions that spread further are not taken for metres (by default the setting).
     """
     told = COMMANDS if set(COMMANDS) <= set(entries) else (FORWARD,)
     numbers = _columns(table, entries, ("t_s", "x_m", "y_m", *told))
@@ -82,6 +82,7 @@ def metres_a_unit(table: pd.DataFrame, entries: Mapping[str, Any], largest_m: fl
         return None
     t, x, y, *speeds = numbers
     good = np.isfinite(t) & np.isfinite(x) & np.isfinite(y)
+    largest_m = _LARGEST_M if largest_m is None else largest_m
     if good.sum() < 3 or max(np.ptp(x[good]), np.ptp(y[good])) > largest_m:
         return None
     lasts = np.maximum(np.append(np.diff(t), 0.0), 0.0)
