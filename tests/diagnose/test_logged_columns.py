@@ -142,7 +142,7 @@ def test_a_term_that_was_fitted_beside_effects_is_tried_in_the_extended_model():
         one = replace(found, formula=hint, terms=(), selection=replace(selection, accepted=accepted))
         (line,) = (line for line in diagnosis_text(one, command=words).split("\n") if "bns add log.csv loss" in line)
         assert line.endswith(f"bns add log.csv loss --term 'k * v' --on v {ending} -o NEW.yaml")
-        assert ("-o EXTENDED.yaml writes" in line) is bool(accepted)
+        assert ("(written with -o EXTENDED.yaml)" in line) is bool(accepted)
 
 
 def test_a_column_whose_name_could_be_a_numbers_is_a_column_in_the_file_too():

@@ -19,6 +19,7 @@ from bns.diagnose.values import numbers_of, without_width
 
 _CAUSES = DEFAULTS.report.causes
 _LISTED = DEFAULTS.report.listed_causes
+_UNKNOWN = "something that none of the known effects explains"
 
 
 def figures_in_words(value: float, low: float | None, high: float | None, unit: str) -> tuple[str, str]:
@@ -78,12 +79,12 @@ def headline(d: Diagnosis) -> str:
         causes = [_all_of(d, tuple(n for n in names if n not in shared)) or "nothing else" for names in explanations]
         some = causes[:_CAUSES] + (["something else"] if len(causes) > _CAUSES else [])
         either = f"{_all_of(d, shared, numbers)}; and either" if shared else "either"
-        rest = "; and also something that none of the known effects explains" if d.verdict == "unlisted" else ""
+        rest = f"; and also {_UNKNOWN}" if d.verdict == "unlisted" else ""
         return f"Missing from the model: {either} {', or '.join(some)}{rest}. These measurements cannot decide which."
     return {
         "none": "Nothing is missing from the model that these measurements could show.",
         "effects": f"Missing from the model: {said}.",
-        "unlisted": f"Missing from the model: {said}, and something that none of the known effects explains."
+        "unlisted": f"Missing from the model: {said}, and {_UNKNOWN}."
         if said
         else "Something is missing from the model that none of the known effects explains.",
         "insufficient-data": "These measurements do not suffice to say whether anything is missing.",
@@ -95,7 +96,7 @@ def head_of_page(d: Diagnosis) -> tuple[str, list[str]]:
     tied = d.selection is not None and bool(d.selection.competing_models)
     if d.verdict not in {"effects", "unlisted"} or tied or len(d.effects) < _LISTED:
         return headline(d), []
-    rest = ", and something that none of the known effects explains" if d.verdict == "unlisted" else ""
+    rest = f", and {_UNKNOWN}" if d.verdict == "unlisted" else ""
     return f"Missing from the model: {len(d.effects)} effects{rest}.", _each_of(d, d.effects, d.numbers)
 
 

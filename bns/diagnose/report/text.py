@@ -170,7 +170,7 @@ def _hint(formula: Formula, words: str, command: Mapping[str, str], beside: bool
     term = f"{formula.name} --term {shlex.quote(formula.term)} --on {formula.on}"
     first, model = "to try it", command["model"]
     if beside:
-        first = f"to try it beside the effects, in the model that -o {_EXTENDED} writes"
+        first = f"to add it to the extended model (written with -o {_EXTENDED})"
         model = f"--model {_EXTENDED} {command.get('shared', '')}".strip()
     yield f"    {first}: bns add {command['data']} {term} {model} -o NEW.yaml"
 

@@ -55,7 +55,7 @@ class Select:
         "An effect that lowers no error by `least_fall` is named nevertheless, if without it a number of an effect that does "
         "lower one is certainly another one, by this fraction of what that effect does. Without a gain of 0.99 a dead zone of "
         "5.3 mm/s became one of 6.5 (22 %); without a backlash that did not exist the numbers of a controller's overshoot "
-        "changed by 3 %: two logs of independent simulators. No such effect was found in 230 generated worlds.",
+        "changed by 3 %: two logs of independent simulators. No such effect was found in 226 generated worlds.",
     )
     least_fall_luck: float = setting(
         0.3,
