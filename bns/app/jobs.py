@@ -28,6 +28,7 @@ class Jobs:
         self._document, self._say, self._waiting = document, say, list[str]()
         self._begun, self._early = False, list[Callable[[], None]]()
         self._making: int | None = None
+        self._loop, self._ended = asyncio.get_running_loop(), False
         self.changed = changed
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="bns-page")
 
@@ -85,7 +86,12 @@ class Jobs:
                     self._tell()
                     _end(future.result, done, failed)
 
-            self._document.add_next_tick_callback(show)
+            def ask() -> None:
+                if not self._ended:
+                    self._document.add_next_tick_callback(show)
+
+            if not self._loop.is_closed():
+                self._loop.call_soon_threadsafe(ask)
 
         def on_the_page() -> T:
             with set_curdoc(self._document):  # else Panel takes the page that another thread is busy with, which may be none
@@ -116,7 +122,8 @@ class Jobs:
             self._say(self._waiting[0] if self._waiting else "")
 
     def end(self) -> None:
-        """Nothing more is begun."""
+        """Nothing more is begun or shown."""
+        self._ended = True
         self._pool.shutdown(wait=False, cancel_futures=True)
 
 

@@ -22,7 +22,7 @@ LOG = FOLDER / "khepera-log.csv"
 
 def test_a_lost_connection_is_said_and_the_page_comes_back_as_it_was(visit):
     visited = visit(LOG)
-    page = visited.browser.new_page()
+    page = visited.empty()
     sockets, looked = [], []
     page.route_web_socket(re.compile("/ws"), lambda socket: (sockets.append(socket), socket.connect_to_server()))
     page.route("**/bokeh.min.js", lambda route: looked.append(route) if route.request.method == "HEAD" else route.continue_())
@@ -175,7 +175,7 @@ def test_a_screen_reader_can_name_everything(visit):
 def test_what_one_change_brings_comes_in_one_message(visit):
     """In several, a picture could get data that name a part which the browser does not have yet."""
     visited = visit(LOG)
-    page, came = visited.browser.new_page(), []
+    page, came = visited.empty(), []
 
     def keep(frame):
         came.append(frame)
@@ -220,7 +220,7 @@ def test_the_first_picture_comes_with_the_page_or_after_it(visit, monkeypatch, l
     monkeypatch.setattr(jobs.Jobs, "begin", once_all_wait)
     monkeypatch.setattr(Screens, "_made", once_it_is_asked_for)
     visited = visit(LOG)
-    page, came, said = visited.browser.new_page(), [], []
+    page, came, said = visited.empty(), [], []
 
     def keep(frame):
         came.append(frame)

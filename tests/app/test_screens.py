@@ -1,7 +1,9 @@
 """Screens without a browser: what they show of terms, of effects while a diagnosis works, of the snake and of networks."""
 
+import asyncio
 import json
 import re
+import threading
 
 import pytest
 
@@ -17,6 +19,7 @@ from tests.hidden_snake.worlds import Hidden, World, driven
 pytest.importorskip("panel", reason="the extra app (Panel) is not installed")
 
 import panel as pn
+from bokeh.document import Document
 
 from bns.app.explore import tabs_of
 from bns.app.html import found_errors
@@ -118,12 +121,13 @@ def test_trials_have_the_names_of_the_log_in_the_picture_of_all_trials():
 
 
 class Ticks:
-    """A document whose next tick comes when the test says so."""
+    """A document whose next tick comes when the test says so; only the thread that made it may touch it."""
 
     def __init__(self):
-        self.asked = []
+        self.asked, self.thread = [], threading.get_ident()
 
     def add_next_tick_callback(self, act):
+        assert threading.get_ident() == self.thread
         self.asked.append(act)
 
     def tick(self):
@@ -132,30 +136,75 @@ class Ticks:
             act()
 
 
-def test_nothing_is_shown_before_the_browser_has_the_page():
-    document, said, done = Ticks(), [], []
-    jobs = Jobs(document, said.append, lambda _by: None)
-    jobs.run("first", lambda: 1, done.append, done.append)
-    jobs.run("second", lambda: 2, done.append, done.append)
+async def all_done(jobs):
+    """Every job has ended, and the loop has had its turn."""
     jobs._pool.shutdown(wait=True)
-    document.tick()
-    assert (said, done) == ([], [])
-    jobs.begin()
-    document.tick()
-    assert done == [1, 2]
-    assert said == ["first", "second", ""]
+    await asyncio.sleep(0)
+
+
+def test_nothing_is_shown_before_the_browser_has_the_page():
+    async def shown():
+        document, said, done = Ticks(), [], []
+        jobs = Jobs(document, said.append, lambda _by: None)
+        jobs.run("first", lambda: 1, done.append, done.append)
+        jobs.run("second", lambda: 2, done.append, done.append)
+        await all_done(jobs)
+        document.tick()
+        assert (said, done) == ([], [])
+        jobs.begin()
+        document.tick()
+        assert done == [1, 2]
+        assert said == ["first", "second", ""]
+
+    asyncio.run(shown())
 
 
 def test_what_is_made_meanwhile_is_made_for_this_page():
     """Panel asks which page a part is for, twice: the main thread may have let go of its own in between."""
-    document, made = Ticks(), []
-    jobs = Jobs(document, lambda _text: None, lambda _by: None)
-    jobs.begin()
-    jobs.run("which page", lambda: pn.state.curdoc, made.append, made.append)
-    jobs._pool.shutdown(wait=True)
-    document.tick()
-    assert made == [document]
-    assert pn.state.curdoc is not document
+
+    async def made_for():
+        document, made = Ticks(), []
+        jobs = Jobs(document, lambda _text: None, lambda _by: None)
+        jobs.begin()
+        jobs.run("which page", lambda: pn.state.curdoc, made.append, made.append)
+        await all_done(jobs)
+        document.tick()
+        assert made == [document]
+        assert pn.state.curdoc is not document
+
+    asyncio.run(made_for())
+
+
+def test_a_job_that_ends_while_changes_are_held_back_is_shown():
+    """Bokeh holds a request for the next tick back as well; one that came from another thread could be lost with the changes."""
+
+    async def shown():
+        document, made = Document(), []
+        jobs = Jobs(document, lambda _text: None, lambda _by: None)
+        document.hold()
+        jobs.run("meanwhile", lambda: 1, made.append, made.append)
+        jobs._pool.shutdown(wait=True)
+        assert document.callbacks._held_events == []
+        document.unhold()
+        await asyncio.sleep(0)
+        [asked] = document.session_callbacks
+        jobs._begun = True
+        asked.callback()
+        assert made == [1]
+
+    asyncio.run(shown())
+
+
+def test_a_page_that_is_closed_is_shown_nothing_more():
+    async def closed():
+        document = Ticks()
+        jobs = Jobs(document, lambda _text: None, lambda _by: None)
+        jobs.run("too late", lambda: 1, lambda _one: None, lambda _why: None)
+        jobs.end()
+        await all_done(jobs)
+        assert document.asked == []
+
+    asyncio.run(closed())
 
 
 def test_a_list_of_effects_that_could_not_be_made_is_made_with_the_next_picture():

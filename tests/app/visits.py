@@ -20,9 +20,14 @@ class Visit:
     def __init__(self, browser, address):
         self.browser, self.address, self.outside, self.odd = browser, address, [], []
 
-    def open(self, width=1280, address=None):
-        page = self.browser.new_page(viewport={"width": width, "height": 1400})
+    def empty(self, **more):
+        """A page without an address yet."""
+        page = self.browser.new_page(**more)
         page.set_default_timeout(SLOW_MS)
+        return page
+
+    def open(self, width=1280, address=None):
+        page = self.empty(viewport={"width": width, "height": 1400})
         page.on("request", self._requested)
         page.on("console", lambda said: self.odd.append(said.text) if said.type in {"error", "warning"} else None)
         page.on("pageerror", lambda error: self.odd.append(str(error)))
