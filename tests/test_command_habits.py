@@ -153,6 +153,7 @@ def test_results_are_an_option_everywhere_and_the_old_spelling_warns(command, ca
     assert "write --results there" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_figures_are_drawn_by_their_scripts(results, capfd):
     assert main(["figures", "--results", str(results), "--only", "success-by-mutation"]) in {0, 1}
     assert f"page: {(results / 'figures' / 'index.html').absolute()}" in capfd.readouterr().out

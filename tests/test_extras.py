@@ -101,6 +101,7 @@ def test_networks_as_torch_modules_say_what_to_install(monkeypatch):
         to_torch(saved.networks, saved.weights)
 
 
+@pytest.mark.slow
 def test_the_core_needs_no_extra(tmp_path):
     """Runs of both robots, with every library of every extra away."""
     everything = [library for libraries in LIBRARIES.values() for library in libraries]
@@ -143,6 +144,7 @@ def without_extras(tmp_path, monkeypatch, *commands):
     return carried_out(AWAY.format(blocked=everything, commands=[list(command) for command in commands]))
 
 
+@pytest.mark.slow
 def test_a_comparison_needs_no_extra_and_that_of_a_body_names_it(tmp_path, monkeypatch):
     done = without_extras(tmp_path, monkeypatch, of_the_sample_log("compare"), of_the_sample_log("compare", "snake"))
     assert "error of predictions" in done.stdout

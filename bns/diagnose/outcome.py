@@ -196,16 +196,8 @@ def _relative(errors: PairedErrors) -> float:
 
 
 def _negligible(selection: SelectionResult) -> tuple[str, ...]:
-    """As `negligible`; not asked where trials have clocks of their own.
-
-    Of bodies whose cycles scatter each in its own way, an effect alone is judged, too: it can be certain by the cycles that
-    hardly scatter, while the error, which all make, does not fall. And so it is beside effects that the model has: whether two
-    effects are found at once, or one after the other, is no reason to name the second.
-    """
-    if selection.fit.model.per_trial_effect is not None:
-        return ()
-    alone = selection.problem.predictor.luck is None and not selection.nominal.model.effects
-    return negligible(selection, fewest=1 if alone else 0)
+    """As `negligible`; not asked where trials have clocks of their own."""
+    return () if selection.fit.model.per_trial_effect is not None else negligible(selection)
 
 
 def _beside_the_floor(
@@ -307,7 +299,7 @@ def _without_negligible(found: Established, selection: SelectionResult, predicto
         return found
     own = tuple(term.name for term in found.terms)
     beside = replace(selection, problem=found.problem, fit=found.fit, accepted=(*found.names, *own))
-    tiny = negligible(beside, fewest=0)
+    tiny = negligible(beside)
     if set(own) <= set(tiny):
         tiny = tuple(name for name in tiny if name not in own)
     if not tiny:

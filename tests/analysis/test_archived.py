@@ -52,6 +52,7 @@ def test_the_command_draws_from_the_published_archive(study, tmp_path, capsys):
     assert "there is no archive at" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_missing_table_or_column_is_named(real_results, tmp_path):
     path = archive(real_results, tmp_path / "study.parquet").path
     store = Results(path, archived=True)

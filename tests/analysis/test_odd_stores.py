@@ -54,6 +54,7 @@ def test_the_command_draws_or_explains_every_figure(tmp_path, kind, capsys):
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.slow
 def test_a_script_that_fails_is_told_and_costs_no_other_figure(tmp_path, monkeypatch, capsys):
     written(tmp_path / "results", "grid", [record(spec) for spec in specs(6)])
     monkeypatch.setattr(findings, "draw", lambda store: 1 / 0)

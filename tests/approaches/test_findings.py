@@ -97,6 +97,7 @@ def test_the_monitor_follows_a_robot_that_changes():
     assert approach.updates > updates
 
 
+@pytest.mark.slow
 def test_tests_on_which_models_disagree_find_hidden_numbers_with_fewer_drives_than_random_tests():
     """Bongard and Lipson: with as many drives, models are nearer to the target than with random tests."""
     world, errors = hidden(speed_gain={"gain": 0.93}, motor_lag={"tau_s": 0.15}), {1: [], 40: []}
@@ -117,6 +118,7 @@ def test_models_disagree_most_where_they_differ():
     assert (disagreement([one, other], tests) > 0).all()
 
 
+@pytest.mark.slow
 def test_co_evolving_simulators_lower_the_difference_of_fitness():
     """Zagal and Ruiz-del-Solar, figure 9: the difference of fitness falls, though nothing but fitness is used."""
     gained = []

@@ -121,6 +121,7 @@ def test_a_formula_is_added_and_comes_back(data, tmp_path):
     assert model.values_of("mine")["k"] == pytest.approx(-0.12, abs=0.03)
 
 
+@pytest.mark.slow
 def test_an_effect_of_ones_own_is_a_file(data, tmp_path, capsys):
     mine = tmp_path / "drag.py"
     mine.write_text(

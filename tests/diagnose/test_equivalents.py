@@ -92,6 +92,7 @@ def test_one_that_does_it_alone_is_no_pair():
     assert longer_than(model, ["stribeck"], {"stribeck": [DEAD_ZONE]}) == []
 
 
+@pytest.mark.slow
 def test_a_diagnosis_says_so_of_what_was_nearly_as_good_when_an_effect_was_chosen():
     table = measured(hidden(stribeck=STRIBECK), trials=24, seed=5, **QUIET)
     found = diagnose(WheelPredictor(tracks_of(table)), NOMINAL)
@@ -100,6 +101,7 @@ def test_a_diagnosis_says_so_of_what_was_nearly_as_good_when_an_effect_was_chose
     assert said in found.notes
 
 
+@pytest.mark.slow
 def test_a_diagnosis_says_so_in_a_note():
     table = measured(hidden(camera_scale={"factor": 0.95}), trials=16, seed=5)
     found = diagnose(WheelPredictor(tracks_of(table)), NOMINAL)

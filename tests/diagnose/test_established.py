@@ -73,6 +73,7 @@ def test_an_effect_that_is_there_stands_and_one_that_imitates_the_rest_does_not(
     assert low < 1.06 < high
 
 
+@pytest.mark.slow
 def test_what_is_there_stands_where_nothing_is_left():
     predictor = predictor_of(hidden(wheelbase={"factor": 1.06}, speed_gain={"gain": 0.96}))
     found = stands(predictor, "speed-gain", "wheelbase")

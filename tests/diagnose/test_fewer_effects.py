@@ -146,6 +146,7 @@ def _step(name):
     return SelectionStep((SimpleNamespace(name=name),), 0.0, name)
 
 
+@pytest.mark.slow
 def test_a_diagnosis_whose_search_lost_an_effect_keeps_its_tie(late, monkeypatch):
     """A stand-in for the judgement that withdraws: of a clock and a gain, the gain goes, with all that competed with both."""
     plain = outcome.outcome_of
@@ -162,6 +163,7 @@ def test_a_diagnosis_whose_search_lost_an_effect_keeps_its_tie(late, monkeypatch
     assert {*found.effects, *found.selection.competing_models[0]} == {"clock-offset", "command-delay"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("terms", [(), ("a term",)])
 def test_beside_terms_too_it_is_asked_what_competes(late, monkeypatch, terms):
     """A stand-in for the judgement; the answer is what the search is asked, and ends there."""
@@ -180,15 +182,6 @@ def test_beside_terms_too_it_is_asked_what_competes(late, monkeypatch, terms):
     with pytest.raises(AskedError) as ended:
         diagnose(late, NOMINAL)
     assert ended.value.args == (bool(terms),)
-
-
-@pytest.mark.parametrize(("given", "fewest"), [(NOMINAL, 1), (NOMINAL.with_effect("wheelbase", factor=1.0), 0)])
-def test_beside_effects_of_the_model_one_alone_is_judged_as_well(late, monkeypatch, given, fewest):
-    asked = []
-    monkeypatch.setattr(outcome, "negligible", lambda _, fewest: asked.append(fewest) or ())
-    one = standing(late, "clock-offset")
-    outcome._negligible(replace(one, nominal=replace(one.nominal, model=given)))
-    assert asked == [fewest]
 
 
 def test_an_unlisted_verdict_names_what_cannot_be_told_from_an_effect(late):
@@ -289,6 +282,7 @@ def _moved(fit, by):
     return fit.model.with_values({"motor-lag": {"tau_s": fit.model.values_of("motor-lag")["tau_s"] + by}})
 
 
+@pytest.mark.slow
 def test_where_an_effect_only_imitates_the_simpler_one_that_it_extends_is_asked_again(late, monkeypatch):
     searched = standing(late, "clock-offset", "inertia-lag")
     shorter = outcome._with_parts(searched, ("clock-offset",))

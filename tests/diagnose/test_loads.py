@@ -324,6 +324,7 @@ def test_friction_in_the_gears_is_told_from_a_lag_and_a_dead_zone_also_where_a_l
         assert found.fit.model.values_of("gear-friction") == pytest.approx(friction, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_lag_from_the_bench_gives_way_to_turns_that_lag_otherwise_and_the_report_says_so():
     table = measured(hidden(inertia_lag={"tau_s": 0.25, "turn_ratio": 0.3}), trials=20, seed=11, speeds=(-0.2, 0.2))
     predictor = WheelPredictor(tracks_of(table))

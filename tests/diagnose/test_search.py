@@ -46,6 +46,7 @@ def test_one_effect_is_named_with_its_size():
     assert answer["error"]["command"]["after"] < 0.8 * answer["error"]["command"]["before"]
 
 
+@pytest.mark.slow
 def test_a_late_command_ties_with_a_late_clock():
     answer = diagnosed(hidden(command_delay={"delay_s": 0.08})).as_json()
     assert answer["verdict"] == "tie"
@@ -54,6 +55,7 @@ def test_a_late_command_ties_with_a_late_clock():
     assert any("look the same in a log" in note for note in answer["notes"])
 
 
+@pytest.mark.slow
 def test_an_early_clock_is_no_late_command():
     answer = diagnosed(hidden(clock_offset={"offset_s": -0.08})).as_json()
     assert (answer["verdict"], answer["effects"]) == ("effects", ["clock-offset"])

@@ -133,7 +133,7 @@ def test_handlers_are_put_back():
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("jobs", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_killed_at_any_moment_and_resumed_it_gives_the_same_evals(tmp_path, start, jobs):
     moments, kills = random.Random(jobs), 0
     for _ in range(2):

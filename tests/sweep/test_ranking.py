@@ -50,7 +50,11 @@ def one(outcomes):
 
 @pytest.mark.parametrize(
     ("rates", "studies", "share"),
-    [(spread_rates(-0.5, 75), 100, 0.4), (spread_rates(-2.0, 75), 40, 0.42), (spread_rates(-0.5, 500), 3, 0.2)],
+    [
+        pytest.param(spread_rates(-0.5, 75), 100, 0.4, marks=pytest.mark.slow),
+        (spread_rates(-2.0, 75), 40, 0.42),
+        (spread_rates(-0.5, 500), 3, 0.2),
+    ],
     ids=["75", "75-rare", "500"],
 )
 def test_resampled_studies_have_the_same_winners_in_the_same_order_from_a_part_of_the_runs(rates, studies, share):

@@ -27,15 +27,15 @@ _NO_WIDTH = DEFAULTS.report.no_width
 _ALL = "all"
 
 
-def negligible(selection: SelectionResult, fewest: int = 1) -> tuple[str, ...]:
+def negligible(selection: SelectionResult) -> tuple[str, ...]:
     """Accepted effects without which no held-out error is higher by `least_fall`, at any horizon; the least first.
 
     Nor does a number of one that is not negligible itself change by `least_shift`, for certain. Each is judged beside all that
-    are kept, so of two that can stand for one another one is kept. The last ``fewest`` are not judged: an effect alone has been,
-    by the errors of the model as given.
+    are kept, so of two that can stand for one another one is kept. An effect alone is judged, too: white noise of a tracker, or
+    cycles that hardly scatter, can make certain what no error shows.
     """
     dropped: tuple[str, ...] = ()
-    while len(kept := tuple(name for name in selection.accepted if name not in dropped)) > fewest:
+    while len(kept := tuple(name for name in selection.accepted if name not in dropped)):
         fits = _without_each(selection, dropped, kept)
         errors = _errors_of(selection.problem, fits)
         falls = {name: _largest_fall(errors, name, _ALL) for name in kept}

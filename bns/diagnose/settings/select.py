@@ -42,8 +42,8 @@ class Select:
     least_fall: float = setting(
         0.02,
         "1",
-        "Of several effects (of a body on joints, also of one), one that lowers the held-out error (root mean square, median, "
-        "heading) by less than this fraction at every horizon is not named. Of 114 generated worlds with one hidden effect the "
+        "An effect that lowers the held-out error (root mean square, median, heading) by less than this fraction at every "
+        "horizon is not named, also where it is the only one. Of 114 generated worlds with one hidden effect the "
         "weakest lowered it by 15 %; a clock offset that only compensated for half a time step of another simulator, by 1 %. A "
         "body with nothing hidden, written independently, was said to have one link with 1.10 times the friction, which lowered "
         "it by 0.02 %. By this fraction an error must also rise before effects or terms are withdrawn for it, and differ before "
