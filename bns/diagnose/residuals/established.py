@@ -12,9 +12,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from bns.diagnose.estimate.cross_validation import held_out_steps
 from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.lacking import fit_without
 from bns.diagnose.estimate.plausibility import implausible
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.significance import MIN_Z, PairedComparison, paired_elpd_diff
@@ -78,8 +80,7 @@ class _State:
 
     def lacking(self, names: Sequence[str]) -> dict[str, Fit]:
         """The fits without each of some effects or terms."""
-        model, near = self.fit.model, self.fit.jacobian_by_parameter
-        fits = each(lambda name: self.problem.fit(model.without(name), nearby=near), names)
+        fits = each(partial(fit_without, self.problem, self.fit), names)
         return dict(zip(names, fits, strict=True))
 
     def without(self, predictor: Predictor, name: str, lacking: Fit) -> _State:
@@ -280,7 +281,7 @@ def _without_shifts(predictor: Predictor, state: _State) -> _State:
     """Without the effects that a free response in time contains, however well they do beside its coarse steps."""
     if any(term.signal == RESPONSE for term in state.terms):
         for name in [shift for shift in SHIFTS if shift in state.names]:
-            state = state.without(predictor, name, state.problem.fit(state.fit.model.without(name)))
+            state = state.without(predictor, name, fit_without(state.problem, state.fit, name))
     return state
 
 
@@ -370,7 +371,7 @@ def _alone(predictor: Predictor, given: Model, state: _State) -> dict[str, float
         model = model.without(term.name)
     problem = problem_for(predictor, model)
     fit = problem.fit(model)
-    return {name: paired_elpd_diff(problem.fit(model.without(name)).held_out, fit.held_out)[0] for name in state.names}
+    return {name: paired_elpd_diff(fit_without(problem, fit, name).held_out, fit.held_out)[0] for name in state.names}
 
 
 def _pruned(predictor: Predictor, state: _State, level: float, alone: Mapping[str, float] | None = None) -> _State:
@@ -389,5 +390,5 @@ def _pruned(predictor: Predictor, state: _State, level: float, alone: Mapping[st
         state = state.without(predictor, least, lacking[least])
     while state.terms and (absurd := next((name for name in state.names if implausible(state.fit, name)), "")):
         # beside a curve no effect needs numbers that no robot has: it bends the curve
-        state = state.without(predictor, absurd, state.problem.fit(state.fit.model.without(absurd)))
+        state = state.without(predictor, absurd, fit_without(state.problem, state.fit, absurd))
     return state

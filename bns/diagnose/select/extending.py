@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping
 
 from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.lacking import fit_without
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect
 
@@ -80,7 +81,10 @@ def shorter(catalogue: Mapping[str, Effect], problem: Problem, fit: Fit, name: s
 
 def reduced(catalogue: Mapping[str, Effect], problem: Problem, fit: Fit, name: str) -> Fit:
     """The fit that lacks an effect; of one that extends another, with that other in its place."""
+    parts = extended(catalogue, name)
+    if not parts:
+        return fit_without(problem, fit, name)
     model, values = fit.model.without(name), fit.model.values_of(name)
-    for part in extended(catalogue, name):
+    for part in parts:
         model = model.with_active(catalogue[part], tuple(values[p.name] for p in catalogue[part].parameters))
     return problem.fit(model, nearby=fit.jacobian_by_parameter)

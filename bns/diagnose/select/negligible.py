@@ -14,6 +14,7 @@ import numpy as np
 
 from bns.diagnose.estimate.cross_validation import held_out_steps
 from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.lacking import fit_without
 from bns.diagnose.estimate.parameters import FreeParameter
 from bns.diagnose.predict.paired_errors import PairedErrors, paired_errors
 from bns.diagnose.select.result import SelectionResult
@@ -106,8 +107,8 @@ def _without_each(selection: SelectionResult, dropped: Sequence[str], kept: Sequ
     problem, model = selection.problem, selection.fit.model
     for name in dropped:
         model = model.without(name)
-    models = {_ALL: model, **{name: model.without(name) for name in kept}}
-    return {name: problem.fit(one, nearby=selection.fit.jacobian_by_parameter) for name, one in models.items()}
+    whole = problem.fit(model, nearby=selection.fit.jacobian_by_parameter)
+    return {_ALL: whole, **{name: fit_without(problem, whole, name) for name in kept}}
 
 
 def _errors_of(problem: Problem, fits: Mapping[str, Fit]) -> PairedErrors:

@@ -18,6 +18,7 @@ from bns.diagnose.estimate.clocks.trial_clock_test import (
     with_shared_clock,
 )
 from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.lacking import fit_without
 from bns.diagnose.estimate.plausibility import at_bound, implausible, limiting, undetermined
 from bns.diagnose.estimate.problem import settled_problem
 from bns.diagnose.estimate.significance import MIN_Z
@@ -442,7 +443,7 @@ class StepwiseSelection:
         Nor may one with more numbers have one that may be anything: a warm-up of any length at all is a gain.
         """
         competing_models: list[tuple[tuple[str, ...], Fit]] = []
-        lacking = cache(partial(without, problem, fit))
+        lacking = cache(partial(fit_without, problem, fit))
         for name, other, tried in self._exchanges.of(problem, fit, accepted):
             if len(tried.free) > len(fit.free) and limiting(tried, other):
                 continue
@@ -457,8 +458,3 @@ class StepwiseSelection:
 
 def _per_trial_effect(model: Model) -> str:
     return model.per_trial_effect.effect.name if model.per_trial_effect else ""
-
-
-def without(problem: Problem, fit: Fit, name: str) -> Fit:
-    """The fit that lacks an effect."""
-    return problem.fit(fit.model.without(name), nearby=fit.jacobian_by_parameter)

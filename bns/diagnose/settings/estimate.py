@@ -41,6 +41,13 @@ class Estimate:
         "A fit from another start counts as another minimum if its loss is lower by this; smaller differences are "
         "rounding errors.",
     )
+    lacking_lost: float = setting(
+        2.0,
+        "1",
+        "A fit without an effect whose loss rises by more than this many times what the curvature promises is begun again under "
+        "more noise: robust losses grow more slowly than the quadratic form, so only a fit that lost its way ends above it. A "
+        "gain of 1.095 that a curve took back to 1.013 seemed to be worth 4,500 of log-likelihood a trial on one log.",
+    )
     set_rounds: int = setting(
         3,
         "rounds",
