@@ -37,9 +37,12 @@ def test_what_is_left_takes_over_where_a_fit_from_its_own_values_is_lost(gain, m
     lacking = fit_without(problem, fit, "speed-gain")
     assert lacking.loss == pytest.approx(fit.loss, rel=0.01)
     assert lacking.values == pytest.approx([0.01], abs=1e-3)
-    assert fit_without(problem, fit, "term").values == pytest.approx([1.01], abs=1e-3)
     monkeypatch.setattr(lacking_module, "LOST", np.inf)
     assert (fit_without(problem, fit, "speed-gain").loss > 10.0 * fit.loss) == (gain == 1.6)
+
+
+def test_an_effect_takes_over_from_a_term():
+    assert fit_without(*shared(1.2), "term").values == pytest.approx([1.01], abs=1e-3)
 
 
 def test_the_last_effect_leaves_the_model_as_given():
