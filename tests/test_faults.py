@@ -1,5 +1,6 @@
 """Faults that a user's machine brings: each ends in a sentence, not in a traceback."""
 
+import io
 import re
 import subprocess
 import sys
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from bns.cli.main import main
+from bns.cli.streams import usable_streams
 from bns.engine import jit
 from bns.engine.evolution import tournament_cdf
 from bns.engine.philox import Key
@@ -65,6 +67,31 @@ def test_closed_or_full_streams_are_no_traceback(streams, tmp_path):
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == (2 if "full" in streams else 0)
     assert "Traceback" not in done.stderr
+
+
+class Narrow(io.RawIOBase):
+    """Takes four bytes at a time."""
+
+    def __init__(self):
+        self.taken = b""
+
+    def writable(self):
+        return True
+
+    def write(self, data):
+        self.taken += bytes(data[:4])
+        return min(len(data), 4)
+
+
+def test_output_that_is_taken_in_parts_is_written_whole_without_a_buffer_too(monkeypatch):
+    narrow = Narrow()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(narrow, "utf-8", write_through=True))
+    sys.stdout.write("0123456789\n")
+    assert narrow.taken == b"0123"  # Python's own way, with PYTHONUNBUFFERED=1
+    narrow.taken = b""
+    usable_streams()
+    print("0123456789", flush=True)
+    assert narrow.taken == b"0123456789\n"
 
 
 def test_pages_outside_of_the_site_link_to_what_exists():

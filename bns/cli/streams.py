@@ -28,10 +28,13 @@ def usable_streams() -> None:
     A terminal that is closed later takes nothing and is no fault: whatever ends then ends with its own exit code.
     """
     for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:  # closed by whoever called
+        stream = getattr(sys, name)
+        if stream is None:  # closed by whoever called
             setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115  # for the life of the process
-        elif getattr(sys, name).isatty():
-            setattr(sys, name, _that_may_go(getattr(sys, name)))
+        elif stream.isatty():
+            setattr(sys, name, _that_may_go(stream))
+        elif type(stream) is io.TextIOWrapper and isinstance(stream.buffer, io.RawIOBase):
+            setattr(sys, name, _that_goes_on(stream))
     codecs.register_error("bns-plain", _spelt)
     for stream in (sys.stdout, sys.stderr):
         reconfigure = getattr(stream, "reconfigure", None)  # what tests and notebooks put there has none
@@ -56,6 +59,14 @@ def _that_may_go(stream: io.TextIOWrapper) -> io.TextIOWrapper:
     stream.flush()
     raw = _Terminal(stream.fileno(), "w", closefd=False)
     return io.TextIOWrapper(io.BufferedWriter(raw), stream.encoding, line_buffering=True)
+
+
+def _that_goes_on(stream: io.TextIOWrapper) -> io.TextIOWrapper:
+    """Under PYTHONUNBUFFERED=1 Python forgets what a disk that fills up did not take of a text, and reports no fault."""
+    raw: io.RawIOBase = stream.buffer  # type: ignore[assignment]  # no buffer is between
+    made = io.TextIOWrapper(io.BufferedWriter(raw), stream.encoding, line_buffering=True)
+    vars(made)["instead_of"] = stream  # which would close the file when nobody knew it any more
+    return made
 
 
 def _spelt(error: UnicodeError) -> tuple[str, int]:

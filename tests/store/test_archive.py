@@ -264,3 +264,40 @@ def test_a_sweep_that_lies_in_an_archive_alone_stays_in_the_next(tmp_path):
     assert archive(tmp_path / "results", tmp_path / "one.parquet", ["grid"]).sweeps == {"grid": 3}
     with pytest.raises(StoreError, match=r"unknown sweep in .* 'gird'\. Did you mean 'grid'"):
         archive(tmp_path / "results", tmp_path / "none.parquet", ["gird"])
+
+
+@pytest.mark.filterwarnings("ignore:.*gone, though")
+@pytest.mark.parametrize("sweeps", [["first"], None])
+def test_runs_whose_evaluations_are_gone_are_left_out_of_an_archive_and_no_archive_is_empty(tmp_path, sweeps):
+    results, path = tmp_path / "results", tmp_path / "a.parquet"
+    for sweep, seed in (("first", 1), ("second", 2)):
+        archive_of(results, sweep, [record(RunSpec(seed=seed, evaluations=4))], tmp_path)
+    assert archive(results, path, sweeps).left_out == 0
+    whole = path.read_bytes()
+    for part in sorted((results / "evals").rglob("*.parquet")):
+        if "first" in str(part):
+            part.unlink()
+    if sweeps:
+        with pytest.raises(StoreError, match=r"no finished run in .* to archive: 1 run left out"):
+            archive(results, path, sweeps)
+        assert path.read_bytes() == whole
+    else:
+        made = archive(results, path)
+        assert (made.runs, made.left_out) == (1, 1)
+        assert "1 run left out, whose evaluations are damaged or gone" in str(made)
+        with connect_archives([path]) as back:
+            assert back.execute("SELECT seed FROM runs").fetchall() == [(2,)]
+
+
+@pytest.mark.filterwarnings("ignore:.*gone, though")
+def test_of_an_archive_runs_without_their_evaluations_do_not_count(tmp_path, monkeypatch):
+    """As archives of an earlier release may have them."""
+    monkeypatch.setattr("bns.store.archive.write.FINISHED", "SELECT sweep, run_id FROM runs")
+    results = tmp_path / "results"
+    archive_of(results, "grid", records(2, evaluations=3), tmp_path)
+    for part in (results / "evals").rglob("*.parquet"):
+        part.unlink()
+    archive(results, tmp_path / "archived" / "bad.parquet")
+    assert recorded(tmp_path, "grid") == {}
+    with connect_archives([tmp_path / "archived" / "bad.parquet"]) as back:
+        assert back.execute("SELECT count(*) FROM runs").fetchall() == [(0,)]

@@ -100,6 +100,8 @@ def recorded(results: Path | str, sweep: str) -> dict[str, str]:
 def connect_archives(paths: Sequence[Path]) -> duckdb.DuckDBPyConnection:
     """A DuckDB connection with the views runs, evals and specs over archives. A run that several of them have counts once.
 
+    One that is ok counts only with all of its evaluations.
+
     There are views generations, probes and paths as well if an archive has runs that recorded them.
 
     Raises:
@@ -110,6 +112,7 @@ def connect_archives(paths: Sequence[Path]) -> duckdb.DuckDBPyConnection:
     connection.execute("SET TimeZone = 'UTC'")
     files = ", ".join(pattern(path) for path in paths)
     connection.execute(f"""CREATE TABLE archived AS SELECT * FROM read_parquet([{files}], union_by_name = true)
+        WHERE status <> 'ok' OR len(success_bits) = evaluations
         QUALIFY row_number() OVER (PARTITION BY sweep, run_id ORDER BY status <> 'ok') = 1""")
     there = set(connection.table("archived").columns)
     columns = (*RUN_COLUMNS, *(name for name in (*COMPARED_RUN, *RECORDING_RUN) if name in there))

@@ -35,7 +35,7 @@ from bns.store.archive.kept import (
 from bns.store.archive.read import connect_archives, recorded_tables, stored_archives
 from bns.store.disk.digest import BLANK, FIELD, sealed
 from bns.store.disk.files import publish
-from bns.store.read.reader import connect
+from bns.store.read.reader import FINISHED, connect
 from bns.store.schema import METADATA_KEY, PARAMETERS, SCHEMA_VERSION
 
 _LEVEL = 19
@@ -48,16 +48,19 @@ _ENGINE = re.compile(r'"engine_version":(\d+)')
 
 @dataclass(frozen=True)
 class ArchiveSummary:
-    """What was archived: ``path``, ``runs``, ``sweeps`` (name -> runs) and ``size_bytes``."""
+    """What was archived: ``path``, ``runs``, ``sweeps`` (name -> runs) and ``size_bytes``; ``left_out``: runs of the results that
+    do not count as finished, since their evaluations are damaged or gone."""
 
     path: Path
     runs: int
     sweeps: dict[str, int]
     size_bytes: int
+    left_out: int = 0
 
     def __str__(self) -> str:
         listed = ", ".join(f"{name} {count:,}" for name, count in self.sweeps.items())
-        return f"{self.runs:,} runs ({listed}) in {self.path}, {self.size_bytes / 1e6:.2f} MB"
+        left_out = f"; {_lacking(self.left_out)}" if self.left_out else ""
+        return f"{self.runs:,} runs ({listed}) in {self.path}, {self.size_bytes / 1e6:.2f} MB{left_out}"
 
 
 def archive(results: Path | str, output: Path | str, sweeps: Sequence[str] | None = None) -> ArchiveSummary:
@@ -76,8 +79,10 @@ def archive(results: Path | str, output: Path | str, sweeps: Sequence[str] | Non
     (to 0.0001 per metre), the probes (to 0.01 mm), the poses of the fittest's paths (to 0.1 mm) and the time of driving.
     Everything else stays in the results.
 
+    Runs that do not count as finished are left out, and counted.
+
     Raises:
-        StoreError: there are no results, no such sweep, or the file cannot be written.
+        StoreError: there are no results, no such sweep, no run to keep, or the file cannot be written; an older file stays.
     """
     path = Path(output)
     if path.suffix != ".parquet":
@@ -91,16 +96,27 @@ def archive(results: Path | str, output: Path | str, sweeps: Sequence[str] | Non
                 raise StoreError(unknown_name(f"sweep in {results}", name, there))
         chosen = sorted(set(sweeps or there))
         connection.execute("CREATE TEMP TABLE chosen AS SELECT unnest(?::VARCHAR[]) AS sweep", [chosen])
+        connection.execute(f"CREATE TEMP TABLE finished AS SELECT sweep, run_id FROM ({FINISHED}) SEMI JOIN chosen USING (sweep)")
+        lacking = connection.execute("""SELECT sweep, run_id FROM runs SEMI JOIN chosen USING (sweep)
+            ANTI JOIN finished USING (sweep, run_id)""").fetchall()
         recorded = _recorded(connection, former, chosen)
         select = _select(_comparing(approaches, chosen), recorded)
         table = connection.sql(select).to_arrow_table()
         plans = connection.sql("SELECT * FROM specs SEMI JOIN chosen USING (sweep) ORDER BY ALL").to_arrow_table().to_pylist()
     if former:
         table, plans = _with_former(table, plans, former, chosen)
+    names = table["sweep"].to_pylist()
+    left_out = len({*lacking} - {*zip(names, table["run_id"].to_pylist(), strict=True)})
+    if not names:
+        why = f": {_lacking(left_out)}" if left_out else ""
+        raise StoreError(f"there is no finished run in {results} to archive{why}. Nothing was written.")
     data = _file_bytes(table, plans)
     publish(data, path.with_name(f".{path.name}.part"), path)
-    names = table["sweep"].to_pylist()
-    return ArchiveSummary(path, len(names), {name: names.count(name) for name in chosen}, len(data))
+    return ArchiveSummary(path, len(names), {name: names.count(name) for name in chosen}, len(data), left_out)
+
+
+def _lacking(runs: int) -> str:
+    return f"{runs:,} run{'' if runs == 1 else 's'} left out, whose evaluations are damaged or gone: the sweep makes them again"
 
 
 def _with_former(
@@ -173,7 +189,7 @@ def _select(comparing: Sequence[str], recorded: Mapping[str, Sequence[str]]) -> 
         SELECT {", ".join(f"runs.{name}" for name in RUN_COLUMNS)}, coalesce(radii, false) AS radii,
                {", ".join(f"coalesce(kept.{name}, []) AS {name}" for name in lists)}
                {"".join(of_these)} {"".join(details)}
-        FROM runs SEMI JOIN chosen USING (sweep)
+        FROM runs SEMI JOIN finished USING (sweep, run_id)
         LEFT JOIN (SELECT run_id, sweep, count({NEAR[0]}) > 0 AS radii, {listed}
                    FROM evals SEMI JOIN chosen USING (sweep) GROUP BY run_id, sweep) AS kept USING (run_id, sweep)
         {" ".join(joined)}

@@ -59,7 +59,7 @@ def explained(action: str, path: Path) -> Iterator[None]:
         elif error.errno in _FULL:
             reason, remedy = (
                 "The disk, quota or file size limit is full.",
-                "free some space and repeat the command, which continues where it stopped.",
+                "free some space and repeat the command (a sweep continues where it stopped).",
             )
         elif error.errno in _LOCKED_OUT:
             reason, remedy = (

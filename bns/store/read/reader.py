@@ -21,6 +21,10 @@ if TYPE_CHECKING:  # half a second to load, and a run needs no table
 Where = str | Mapping[str, Any] | None
 _T = TypeVar("_T")
 _TRIES = 5
+FINISHED = """SELECT sweep, run_id, status FROM runs ANTI JOIN store.unfinished USING (sweep, run_id)
+    LEFT JOIN (SELECT sweep, run_id, count(*) AS stored FROM evals GROUP BY ALL) USING (sweep, run_id)
+    WHERE status <> 'ok' OR stored = evaluations"""
+"""Over a connection of `connect`: the runs that are really there, as `finished` gives them."""
 _NULLABLE = {field.name for schema in SCHEMAS.values() for field in schema if field.nullable}
 
 
@@ -98,11 +102,7 @@ def _finished(found: Snapshot) -> dict[str, str]:
     if not found.journals and not found.parts["runs"]:
         return {}
     with connect_views(found) as connection:
-        rows = connection.execute("""
-            SELECT run_id, status FROM runs ANTI JOIN store.unfinished USING (sweep, run_id)
-            LEFT JOIN (SELECT run_id, count(*) AS stored FROM evals GROUP BY run_id) USING (run_id)
-            WHERE status <> 'ok' OR stored = evaluations ORDER BY run_id""").fetchall()
-    return dict(rows)
+        return dict(connection.execute(f"SELECT run_id, status FROM ({FINISHED}) ORDER BY run_id").fetchall())
 
 
 def _answer(results: Path, sql: str, *, bounded: bool = False) -> pa.Table:
