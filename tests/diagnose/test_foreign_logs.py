@@ -270,6 +270,7 @@ def test_a_log_without_a_mapping_is_answered_with_a_draft(bag, capsys):
     ("text", "message"),
     [
         ("trial,t_s,x_m,x_m\n0,0,1,2\n", r"a\.csv has more than one column x_m; leave out all but one of that name"),
+        ('trial,t_s,x_m," x_m "\n0,0,1,2\n', r"a\.csv has more than one column x_m; leave out all but one of that name"),
         ('t_s,x_m\n0,1\n1,2,3,4\n', r"a\.csv does not read as csv: line 3 has 4 columns, and the first line 2; put texts"),
     ],
 )
@@ -277,6 +278,11 @@ def test_tables_that_are_no_tables_are_refused_in_words(tmp_path, text, message)
     (tmp_path / "a.csv").write_text(text)
     with pytest.raises(DataError, match=message):
         read_table(tmp_path / "a.csv")
+
+
+def test_blanks_around_headings_are_none_of_the_names(tmp_path):
+    (tmp_path / "a.csv").write_text('trial , t_s," x_m ",y of it\n0,0.5,1,2\n')
+    assert list(read_table(tmp_path / "a.csv").columns) == ["trial", "t_s", "x_m", "y of it"]
 
 
 def test_columns_that_nobody_reads_may_be_there_twice(tmp_path):

@@ -59,7 +59,8 @@ def read_text_table(path: Path) -> pd.DataFrame:
     if names and numbers:
         table.columns = pd.Index(names)
         return table
-    given = [cell.strip('"') for cell in _cells(first, separator)]
+    table.columns = pd.Index([str(name).strip() for name in table.columns])
+    given = [cell.strip('"').strip() for cell in _cells(first, separator)]
     twice = sorted({name for name in given if name in COLUMNS and given.count(name) > 1})
     if twice:  # pandas would call the second x_m.1, and nobody would read it
         raise DataError(f"{path} has more than one column {', '.join(twice)}; leave out all but one of that name.")
