@@ -19,6 +19,7 @@ from bns.trial.folder import (
     JOURNAL,
     MEASUREMENTS,
     check_not_cut,
+    check_not_lost,
     forget_unless,
     locked,
     measured,
@@ -136,6 +137,7 @@ def _driven(trials: list[tuple[np.ndarray, np.ndarray]], how: TrialSetup, journa
 
 def _driven_before(journal: Path, trials: list[np.ndarray], resume: bool) -> int:
     """How many of the trials are in the journal already; HardwareError if they should not be, or are others."""
+    check_not_lost(journal)
     if not journal.exists():
         if resume:
             raise HardwareError(

@@ -68,12 +68,23 @@ class TrialFolder:
                 f"this trial was started before, in {self.path}. Continue it with --resume, or start another with --seed "
                 f"{self.spec.seed + 1}; to repeat this one from the start, move its folder away."
             )
+        check_not_lost(self.journal)
         if resume and not self.journal.exists():
             raise HardwareError(f"there is nothing to resume: no journal in {self.path}. Start without --resume.")
         if not resume:
             return []
         check_not_cut(self.journal)
         return past_evaluations(self.journal)
+
+
+def check_not_lost(journal: Path) -> None:
+    """HardwareError if a table of measurements lies where the journal is gone: a new trial would write over it."""
+    table = journal.with_name(MEASUREMENTS)
+    if table.exists() and not journal.exists():
+        raise HardwareError(
+            f"{table} is there, and {journal.name}, from which it was made, is gone. Restore the journal from a copy to resume "
+            "the trial. To start anew, move the folder away: what was measured is in that table alone (bns compare reads it)."
+        )
 
 
 def check_not_cut(journal: Path) -> None:
@@ -85,13 +96,21 @@ def check_not_cut(journal: Path) -> None:
     if not table.exists():
         return
     try:
-        kept = table.read_bytes().count(b"\n") - 1
+        lines = table.read_bytes().split(b"\n")[:-1]
     except OSError as error:
         raise HardwareError(f"cannot read {table}: {error}. It is compared with the journal; make it readable.") from error
-    if kept > (held := len(measured(journal))):
+    moved = f"mv {table} {table.with_suffix('.old.csv')}"
+    odd = next((n for n, line in enumerate(lines, 1) if line.count(b",") != lines[0].count(b",")), 0)
+    if odd:
         raise HardwareError(
-            f"{journal} has lost its last lines: it holds {held} rows of measurements, {table.name} in the same folder {kept}. "
-            "Restore the journal from a copy, or move the folder away and start from the beginning."
+            f"line {odd} of {table} is no row of measurements. The table is made from the journal; move it away, and it is made "
+            f"again: {moved}"
+        )
+    if (kept := len(lines) - 1) > (held := len(measured(journal))):
+        raise HardwareError(
+            f"{journal} has lost its last lines, or was cut: it holds {held} rows of measurements, {table.name} in the same "
+            f"folder {kept}. Restore the journal from a copy. Or move the table away, which alone has what was measured after "
+            f"row {held}, and resume from where the journal ends: {moved}"
         )
 
 

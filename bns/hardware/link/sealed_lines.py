@@ -93,5 +93,10 @@ def _text(path: Path, number: int, line: bytes, unsealed: int) -> str:
 
 def _wrong(path: Path, number: int, what: str, unsealed: int) -> HardwareError:
     checked = number - 1 > unsealed  # the line before it is as it was written, and so are all above that
-    below = f" Everything above it can be resumed: head -n {number - 1} {path} > FILE, in its place." if checked else ""
+    below = (
+        f" Everything above it can be resumed: head -n {number - 1} {path} > FILE, in its place, once the measurements.csv "
+        "beside it is moved away."
+        if checked
+        else ""
+    )
     return HardwareError(f"line {number} of {path} {what}. Take the file from a copy, unedited.{below}")

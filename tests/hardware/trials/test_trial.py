@@ -88,19 +88,72 @@ def test_a_pause_is_gone_on_with_and_nothing_is_lost(tmp_path, capsys):
 
 
 def test_a_resumed_trial_is_the_trial_that_a_replay_gives(tmp_path, capsys):
-    plan = faults(tmp_path, {"kind": "hang-up", "at_s": 12, "for_s": 2})
-    asked = [*TRIAL, "--evaluations", 3, "--results", tmp_path, "--most-rounds", 3]
-    assert call(*asked, *plan) == 3
-    kept = journal_of(tmp_path).read_bytes()
-    journal_of(tmp_path).write_bytes(b"")
+    asked, journal = paused(tmp_path)
+    kept = journal.read_bytes()
+    journal.write_bytes(b"")
     assert call(*asked, "--resume") == 2
-    assert "has lost its last lines: it holds 0 rows" in capsys.readouterr().err
-    journal_of(tmp_path).write_bytes(kept)
+    assert "has lost its last lines, or was cut: it holds 0 rows" in capsys.readouterr().err
+    journal.write_bytes(kept)
     assert call(*asked, "--resume") == 0
     assert call("trial", "--replay", journal_of(tmp_path), "--results", tmp_path) == 0
     first, again = evaluated(tmp_path, "trials-emulated"), evaluated(tmp_path, "trials-replayed")
     np.testing.assert_array_equal(first["best_fitness"], again["best_fitness"])
     assert len(first) == 3
+
+
+def paused(tmp_path):
+    """What was asked, and the journal of a trial that was interrupted after some drives."""
+    plan = faults(tmp_path, {"kind": "hang-up", "at_s": 12, "for_s": 2})
+    asked = [*TRIAL, "--evaluations", 3, "--results", tmp_path, "--most-rounds", 3]
+    assert call(*asked, *plan) == 3
+    return asked, journal_of(tmp_path)
+
+
+def test_measurements_whose_journal_is_gone_are_not_written_over(tmp_path, capsys):
+    asked, journal = paused(tmp_path)
+    table = journal.with_name("measurements.csv")
+    kept = table.read_bytes()
+    journal.unlink()
+    for way in ([], ["--resume"]):
+        assert call(*asked, *way) == 2
+        assert "journal.jsonl, from which it was made, is gone" in capsys.readouterr().err
+        assert table.read_bytes() == kept
+    journal.parent.rename(tmp_path / "away")
+    assert call(*asked) == 0
+
+
+def test_the_advice_on_a_damaged_journal_works(tmp_path, capsys):
+    """Word by word: what is said after each attempt is done in a shell."""
+    asked, journal = paused(tmp_path)
+    table, lines = journal.with_name("measurements.csv"), journal.read_bytes().splitlines(keepends=True)
+    spoilt = max(n for n, line in enumerate(lines) if b'"kind":"driven"' in line)
+    lines[spoilt] = lines[spoilt].replace(b"driven", b"Driven", 1)
+    journal.write_bytes(b"".join(lines))
+    assert call(*asked, "--resume") == 2
+    said = capsys.readouterr().err
+    assert "once the measurements.csv beside it is moved away" in said
+    command = re.search(r"head -n \d+ \S+ > FILE", said)[0]
+    subprocess.run(["bash", "-c", f"{command} && mv FILE {journal}"], cwd=tmp_path, check=True)
+    assert call(*asked, "--resume") == 2
+    said = capsys.readouterr().err
+    assert "has lost its last lines, or was cut" in said
+    subprocess.run(re.search(r"mv \S+ \S+", said)[0].split(), check=True)
+    assert call(*asked, "--resume") == 0
+    assert table.exists()
+    assert len(past_evaluations(journal)) == 3
+
+
+def test_a_line_of_the_table_that_is_none_is_named_and_the_journal_is_not_blamed(tmp_path, capsys):
+    asked, journal = paused(tmp_path)
+    table = journal.with_name("measurements.csv")
+    rows = table.read_bytes().count(b"\n")
+    table.write_bytes(table.read_bytes() + b"garbage\n")
+    assert call(*asked, "--resume") == 2
+    said = capsys.readouterr().err
+    assert f"line {rows + 1} of {table} is no row of measurements" in said
+    assert "lost its last lines" not in said
+    subprocess.run(re.search(r"mv \S+ \S+", said)[0].split(), check=True)
+    assert call(*asked, "--resume") == 0
 
 
 def test_the_summary_lists_which_planned_faults_happened(tmp_path, capsys):
