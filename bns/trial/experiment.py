@@ -49,6 +49,12 @@ def read_commands(path: Path, robot: Robot) -> list[tuple[np.ndarray, np.ndarray
             f"{path} is no table of comma-separated values. Commands of a {robot.name} are a CSV file with {', '.join(columns)}."
         ) from error
     missing = [name for name in columns if name not in table.columns]
+    other = next((mark for mark in (";", "\t") if mark in str(table.columns[0])), None)
+    if missing and other is not None:
+        raise HardwareError(
+            f"{path} is separated by {'semicolons' if other == ';' else 'tabs'}; separate the columns by commas, with points in "
+            f"decimal numbers: {', '.join(columns)}."
+        )
     if missing:
         raise HardwareError(
             f"{path} lacks the column {', '.join(missing)}; commands of a {robot.name} need {', '.join(columns)}."

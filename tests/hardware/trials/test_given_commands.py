@@ -95,6 +95,7 @@ def test_a_filmed_robot_is_seen_where_it_is_at_any_speed(tmp_path):
     ("text", "message"),
     [
         ("trial,left_m_s,right_m_s\n1,0.1,0.1\n", "lacks the column duration_s"),
+        ("trial;left_m_s;right_m_s;duration_s\n1;0,1;0,1;1\n", "is separated by semicolons; separate the columns by commas"),
         ("trial,left_m_s,right_m_s,duration_s\n1,0.1,0.1,1\n1,9,0.1,1\n", "line 3 of"),
         ("trial,left_m_s,right_m_s,duration_s\n1,0.1,x,1\n", "line 2 of"),
         ("", "is no table of comma-separated values. Commands of a khepera are a CSV file with trial"),
