@@ -10,13 +10,14 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from analysis.approach_summary import of_each_run, on_the_same_seeds
+from analysis.approach_runs import groups, on_the_same_seeds, pooled_over, titled, varied_in_any
+from analysis.approach_summary import of_each_run
 from analysis.figure_result import FigureResult
 from analysis.intervals import FEWEST_SEEDS, band
 from analysis.multiple_tests import holm
-from analysis.results import NoDataError, Results
+from analysis.results import NoDataError, Results, among
 from analysis.robot_time import LASTING, minutes_until_lasting
-from analysis.selection import APPROACHES, in_order
+from analysis.selection import in_order
 from bns.plotting.style import lettered, note, panels, style
 
 NAME = "approach-pairs"
@@ -30,18 +31,20 @@ _STREAM = 20260201
 
 def draw(store: Results) -> list[FigureResult]:
     runs = of_each_run(store)
-    if runs.approach.nunique() < 2:
-        raise NoDataError("no sweep has runs of two approaches; run bns sweep approaches-small")
     evals = store.query(
         f"""SELECT sweep, run_id, robot_s, success FROM evals
-        WHERE starts_with(sweep, '{APPROACHES}') ORDER BY sweep, run_id, evaluation"""
+        WHERE {among("sweep", runs.sweep.unique())} ORDER BY sweep, run_id, evaluation"""
     )
-    drawn = []
-    for (sweep, *_), own in runs.groupby(["sweep", "robot", "world"]):
-        alike = on_the_same_seeds(own)
+    drawn, several = [], groups(runs)
+    for own in several:
+        alike, sweep = on_the_same_seeds(own), own.sweep.iloc[0]
         drawn.append(_draw(scores(alike, evals[(evals.sweep == sweep) & evals.run_id.isin(alike.run_id)])))
     if not (some := [one for one in drawn if one is not None]):
-        raise NoDataError(f"no two approaches have {FEWEST_SEEDS} runs each on the same task and seeds; run bns sweep approaches")
+        names = varied_in_any(several)
+        also = f", with every {titled(names)}" if names else ""
+        raise NoDataError(
+            f"no two approaches have {FEWEST_SEEDS} runs each on the same task and seeds{also}; run bns sweep approaches"
+        )
     return some
 
 
@@ -85,22 +88,26 @@ def compared(by_task: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> dict[str, 
     """Probability of improvement, averaged over tasks, its interval and p-value.
 
     Args:
-        by_task: scores of both approaches on each task, (runs,) each; the same place is the same seed.
+        by_task: scores of both approaches on each task, (runs,) or (settings, runs) each; the same place is the same seed. The
+            runs of a seed at all settings are drawn and exchanged together: they share its luck.
 
     Returns:
         ``probability``; ``low``, ``high``: 95 % percentile bootstrap, runs drawn within tasks, as Agarwal et al. do; ``p``: of
         the two-sided test that exchanges the two runs of a seed at random.
     """
     random = np.random.default_rng(_STREAM)
-    at = float(np.mean([improvement(a, b) for a, b in by_task.values()]))
+    settings = {task: list(zip(*map(np.atleast_2d, both), strict=True)) for task, both in by_task.items()}
+    at = float(np.mean([np.mean([improvement(a, b) for a, b in own]) for own in settings.values()]))
     boot, exchanged = np.zeros(DRAWS), np.zeros(DRAWS)
-    for a, b in by_task.values():
-        n = len(a)
-        often = [_times_drawn(random.integers(0, n, (DRAWS, n))) for _ in (a, b)]
-        boot += _summed(_wins(a, b), *often) / n**2 / len(by_task)
+    for own in settings.values():
+        n = len(own[0][0])
+        often = [_times_drawn(random.integers(0, n, (DRAWS, n))) for _ in range(2)]
         swap = (random.random((DRAWS, n)) < 0.5).astype(float)  # a fair coin
-        both, picked = np.concatenate([a, b]), np.hstack([1 - swap, swap])
-        exchanged += _summed(_wins(both, both), picked, 1 - picked) / n**2 / len(by_task)
+        picked = np.hstack([1 - swap, swap])
+        for a, b in own:
+            both, share = np.concatenate([a, b]), n**2 * len(by_task) * len(own)
+            boot += _summed(_wins(a, b), *often) / share
+            exchanged += _summed(_wins(both, both), picked, 1 - picked) / share
     extreme = np.count_nonzero(np.abs(exchanged - 0.5) >= abs(at - 0.5) - 1e-12)
     low, high = band(boot)
     return {"probability": at, "low": float(low), "high": float(high), "p": (1 + extreme) / (1 + DRAWS)}
@@ -117,15 +124,25 @@ def pairs(runs: pd.DataFrame) -> pd.DataFrame:
 
 def _pairs(runs: pd.DataFrame) -> Iterator[dict[str, Any]]:
     for one, other in combinations(in_order(runs.approach), 2):
-        both = runs[runs.approach == one].merge(runs[runs.approach == other], on=["task", "seed"], suffixes=("", "_other"))
+        on = ["task", "setting", "seed"]
+        both = runs[runs.approach == one].merge(runs[runs.approach == other], on=on, suffixes=("", "_other")).drop_duplicates(on)
+        place = both.groupby("task").seed.transform(lambda seeds: pd.factorize(seeds)[0])
+        both = both.assign(place=place).sort_values(["task", "setting", "place"])
+        both = both[both.groupby(["task", "seed"]).setting.transform("size") == both.groupby("task").setting.transform("nunique")]
         least = both.groupby("task").seed.nunique().min() if len(both) else 0
         if least < FEWEST_SEEDS:
             continue
         row: dict[str, Any] = {"one": one, "other": other, "runs": len(both)}
         for measure in MEASURES:
-            by_task = {task: (own[measure].to_numpy(), own[f"{measure}_other"].to_numpy()) for task, own in both.groupby("task")}
+            by_task = {task: _by_setting(own, measure) for task, own in both.groupby("task")}
             row |= {f"{measure}_{name}": value for name, value in compared(by_task).items()}
         yield row
+
+
+def _by_setting(both: pd.DataFrame, measure: str) -> tuple[np.ndarray, np.ndarray]:
+    """Scores of two approaches, each (settings, seeds), of rows in that order."""
+    shape = (both.setting.nunique(), -1)
+    return both[measure].to_numpy().reshape(shape), both[f"{measure}_other"].to_numpy().reshape(shape)
 
 
 @style()
@@ -148,8 +165,8 @@ def _draw(runs: pd.DataFrame) -> FigureResult | None:
     shows = (
         f"{where}, sweep {first.sweep}. {means}, ties counted half, averaged over tasks. (a) Score: share of successes among the "
         f"evaluations of the last third. (b) Score: robot time until the first of {LASTING} successes in a row. Bold: p < "
-        f"{LEVEL} when the two runs of a seed are exchanged at random ({DRAWS:,} times), adjusted for all pairs (Holm). "
-        f"n = {n} runs."
+        f"{LEVEL} when the two runs of a seed are exchanged at random ({DRAWS:,} times), adjusted for all pairs (Holm)."
+        f"{pooled_over(runs)} n = {n} runs."
     )
     world = str(first.world).split("/")[-1].removesuffix(".yaml")
     return FigureResult(

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from analysis.approach_runs import OTHERS, done, groups, none_alike, on_the_same_seeds, pooled_over, with_settings
 from analysis.figure_result import FigureResult
 from analysis.intervals import bootstrap
-from analysis.results import NoDataError, Results
-from analysis.selection import APPROACHES, in_order
+from analysis.results import Results
+from analysis.selection import in_order
 
 NAME = "approach-summary"
 PAPER = "section 2.6, its approaches compared with BNS"
@@ -16,35 +17,30 @@ _EVALUATIONS = {"late": "3 * evaluation > 2 * evaluations", "early": "3 * evalua
 
 
 def draw(store: Results) -> list[FigureResult]:
-    runs = of_each_run(store)
-    if runs.approach.nunique() < 2:
-        raise NoDataError("no sweep has runs of two approaches; run bns sweep approaches-small")
-    tables = [_table(alike) for _, own in runs.groupby(["sweep", "robot", "world"]) if len(alike := on_the_same_seeds(own))]
+    several = groups(of_each_run(store))
+    tables = [_table(alike) for own in several if len(alike := on_the_same_seeds(own))]
     if not tables:
-        raise NoDataError("no seed has a run of every approach; let bns sweep approaches-small go on")
+        raise none_alike(several)
     return tables
 
 
 def of_each_run(store: Results) -> pd.DataFrame:
-    """A row a finished run: what it is, ``success_late`` ..., ``near_early`` (share of successes, by the task's own criterion and
-    within 10 cm), ``robot_min`` and ``cpu_s``."""
+    """A row a finished run of a sweep with several approaches: what it is, `OTHERS`, ``setting`` (their combination),
+    ``success_late`` ..., ``near_early`` (share of successes, by the task's own criterion and within 10 cm), ``robot_min`` and
+    ``cpu_s``."""
     shares = ", ".join(
         f"avg(evals.{column}::INT) FILTER ({when}) AS {name}_{part}"
         for name, column in (("success", "success"), ("near", "success_10cm"))
         for part, when in _EVALUATIONS.items()
     )
-    return store.query(f"""
-        SELECT sweep, run_id, robot, task, world, approach, seed, {shares},
+    others = ", ".join(f"done.{name}" for name in OTHERS)
+    return with_settings(
+        store.query(f"""
+        SELECT sweep, run_id, robot, task, world, approach, seed, {others}, {shares},
                max(robot_s) / 60 AS robot_min, any_value(cpu_s) AS cpu_s
-        FROM evals JOIN (SELECT run_id, sweep, evaluations, cpu_s FROM runs
-                         WHERE status = 'ok' AND starts_with(sweep, '{APPROACHES}')) AS done USING (run_id, sweep)
+        FROM evals JOIN {done(store)} AS done USING (run_id, sweep)
         GROUP BY ALL ORDER BY ALL""")
-
-
-def on_the_same_seeds(runs: pd.DataFrame) -> pd.DataFrame:
-    """The runs of tasks and seeds that every approach has: a sweep that was stopped compares like with like."""
-    have = runs.groupby(["task", "seed"]).approach.transform("nunique")
-    return runs[have == runs.approach.nunique()]
+    )
 
 
 def summarized(runs: pd.DataFrame) -> pd.DataFrame:
@@ -86,7 +82,7 @@ def _table(runs: pd.DataFrame) -> FigureResult:
     shows = (
         f"{where}, sweep {first.sweep}. Success of the fittest controller, mean over the tasks {', '.join(tasks)}; late: the "
         "last third of a run's evaluations, early: the first. Intervals: 95 %, bootstrap over seeds. Robot and CPU time: "
-        f"medians. n = {n} runs, {int(table.seeds.min())} seeds at least of each approach."
+        f"medians.{pooled_over(runs)} n = {n} runs, {int(table.seeds.min())} seeds at least of each approach."
     )
     world = str(first.world).split("/")[-1].removesuffix(".yaml")
     name, title = f"{NAME}-{first.sweep}-{first.robot}-{world}", f"Approaches in one table: {where}"

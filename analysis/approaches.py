@@ -7,20 +7,32 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from analysis.approach_runs import (
+    GROUP,
+    OTHERS,
+    done,
+    groups,
+    none_alike,
+    on_the_same_seeds,
+    pooled_over,
+    varied,
+    with_settings,
+)
 from analysis.figure_result import FigureResult
-from analysis.intervals import FEWEST_SEEDS, INTERVALS, band, resampled, wilson
+from analysis.intervals import FEWEST_SEEDS, INTERVALS, POOLED, band, resampled, wilson
 from analysis.labels import counted, task_title
-from analysis.results import NoDataError, Results
+from analysis.results import Results
 from analysis.robot_time import (
     LASTING,
     LATEST,
     minutes_until_lasting,
     of_latest,
+    over_seeds,
     restricted_mean,
     success_by_minute,
     survival,
 )
-from analysis.selection import APPROACHES, in_order
+from analysis.selection import in_order
 from bns.plotting.style import GREY, OKABE_ITO, PAGE_IN, TEXT_PT, lettered, note, style
 
 NAME = "approaches"
@@ -31,19 +43,29 @@ _LINES = ("-", "--")
 
 
 def draw(store: Results) -> list[FigureResult]:
-    runs = store.query(
-        f"""SELECT sweep, run_id, robot, task, world, approach, evaluation, robot_s, evals.success, evaluated_fitness_error, cpu_s
-        FROM evals JOIN (SELECT run_id, sweep, cpu_s FROM runs WHERE status = 'ok') AS done USING (run_id, sweep)
-        WHERE starts_with(sweep, '{APPROACHES}') ORDER BY sweep, robot, task, world, approach, run_id, evaluation"""
+    others = ", ".join(f"done.{name}" for name in OTHERS)
+    evals = store.query(
+        f"""SELECT sweep, run_id, robot, task, world, approach, seed, {others}, evaluation, robot_s, evals.success,
+               evaluated_fitness_error, cpu_s
+        FROM evals JOIN {done(store)} AS done USING (run_id, sweep)
+        ORDER BY sweep, robot, task, world, approach, run_id, evaluation"""
     )
-    if runs.approach.nunique() < 2:
-        raise NoDataError("no sweep has runs of two approaches; run bns sweep approaches-small")
-    return [_draw(own) for _, own in runs.groupby(["sweep", "robot", "task", "world"])]
+    several = groups(with_settings(evals), (*GROUP, "task"))
+    comparable = [own for own in map(_comparable, several) if len(own)]
+    if not comparable:
+        raise none_alike(several)
+    return [_draw(own) for own in comparable]
+
+
+def _comparable(evals: pd.DataFrame) -> pd.DataFrame:
+    """All runs where they differ in approach and seed alone, else those `on_the_same_seeds`."""
+    return on_the_same_seeds(evals) if varied(evals) else evals
 
 
 @style()
 def _draw(evals: pd.DataFrame) -> FigureResult:
     first = evals.iloc[0]
+    bands, unit = (POOLED, "seeds") if varied(evals) else (f"bands: {INTERVALS}", "runs")
     approaches = in_order(evals.approach)
     looks = {name: {"color": OKABE_ITO[i % 7], "linestyle": _LINES[i // 7 % 2]} for i, name in enumerate(approaches)}
     rows = -(-len(approaches) // _ACROSS)
@@ -78,15 +100,15 @@ def _draw(evals: pd.DataFrame) -> FigureResult:
     note(
         figure,
         f"{where}; {counted(n, 'run')}, {least} at least of each approach. Curves: mean of the latest {LATEST} evaluations; "
-        f"bands: {INTERVALS}; grey: {approaches[0]}.",
+        f"{bands}; grey: {approaches[0]}.",
     )
     shows = (
         f"Task {where}, {first.sweep}. (a, b) Fraction of runs whose fittest controller completes the task after so many "
         f"evaluations, and robot minutes (all drives counted, with the spec's overhead), mean of the latest {LATEST}; "
         f"below, each approach alone with its interval, and {approaches[0]} in grey. (c) Fraction of runs in which {LASTING} "
         "successes in a row have not begun yet (Kaplan-Meier). Mean minutes until lasting success: restricted to the first "
-        f"{horizon:.0f} min, which every approach was driven, with 95 % bootstrap intervals over runs. n = {n} runs, {least} at "
-        f"least of each approach; {INTERVALS}."
+        f"{horizon:.0f} min, which every approach was driven, with 95 % bootstrap intervals over {unit}."
+        f"{pooled_over(evals)} n = {n} runs, {least} at least of each approach; {bands}."
     )
     table = pd.DataFrame([_row(name, evals[evals.approach == name], numbers[name], horizon) for name in approaches])
     name = f"{NAME}-{first.sweep}-{first.robot}-{first.task}-{str(first.world).split('/')[-1].removesuffix('.yaml')}"
@@ -96,16 +118,22 @@ def _draw(evals: pd.DataFrame) -> FigureResult:
 
 
 def _numbers(own: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
-    """Success by evaluation and by minute, and minutes until it lasts, of one approach."""
+    """Success by evaluation and by minute, and minutes until it lasts (with the seed), of one approach."""
     latest = own.assign(success=of_latest(own))
+    minutes = np.linspace(0, own.groupby("run_id").robot_s.max().min() / 60, MINUTES)
+    by_evaluation, by_minute = _by_evaluation(latest), success_by_minute(latest, minutes)
+    if varied(own):
+        of_seeds = [one for _, one in latest.groupby("seed")]
+        by_evaluation = over_seeds(by_evaluation, [_by_evaluation(one) for one in of_seeds], "evaluation")
+        by_minute = over_seeds(by_minute, [success_by_minute(one, minutes) for one in of_seeds], "minute")
+    return by_evaluation, by_minute, minutes_until_lasting(own).merge(own[["run_id", "seed"]].drop_duplicates(), on="run_id")
+
+
+def _by_evaluation(latest: pd.DataFrame) -> pd.DataFrame:
+    """Share of successes at each evaluation, with Wilson intervals."""
     counts = latest.groupby("evaluation").success.agg(runs="count", successes="sum").reset_index()
     low, high = wilson(counts.successes, counts.runs)
-    last = own.groupby("run_id").robot_s.max().min() / 60
-    return (
-        counts.assign(low=low, high=high),
-        success_by_minute(latest, np.linspace(0, last, MINUTES)),
-        minutes_until_lasting(own),
-    )
+    return counts.assign(low=low, high=high)
 
 
 def _curve(ax: Axes, x: pd.Series, rows: pd.DataFrame, look: dict[str, str], label: str) -> None:
@@ -140,9 +168,10 @@ def _row(
 
 
 def _minutes(until: pd.DataFrame, horizon: float) -> str:
-    """The restricted mean with its interval, from enough runs on."""
+    """The restricted mean with its interval, from enough seeds on; the runs of a seed are drawn together."""
     at = float(restricted_mean(until.minutes, until.ended, horizon)[0])
-    if len(until) < FEWEST_SEEDS:
+    place, seeds = pd.factorize(until.seed)
+    if len(seeds) < FEWEST_SEEDS:
         return f"{at:.1f}"
-    low, high = band(restricted_mean(until.minutes, until.ended, horizon, resampled(len(until))))
+    low, high = band(restricted_mean(until.minutes, until.ended, horizon, resampled(len(seeds))[:, place]))
     return f"{at:.1f} ({low:.1f} to {high:.1f})"

@@ -82,7 +82,7 @@ def _draw(store: Results, chosen: Selection, task: str, rows: pd.DataFrame) -> F
     shows = (
         f"The {len(best)} best combinations of {counted(len(rows), 'combination')}, by the fraction of runs whose fittest "
         f"controller {criterion(store, chosen)} at the last evaluation. As swept: n = {n:,} runs of "
-        f"{', '.join(chosen.sweeps)}, the ones that picked them, so too high; confirmed: {reruns:,} runs on fresh seeds. "
+        f"{chosen.source}, the ones that picked them, so too high; confirmed: {reruns:,} runs on fresh seeds. "
         f"Bars are 95 % Wilson intervals ({INDEPENDENCE})."
     )
     return FigureResult(

@@ -38,8 +38,10 @@ def coverage(store: Results, sweeps: Sequence[str], n: int | None = None) -> Cov
     planned, cells = (sum(getattr(plan, what) for plan in plans.values()) for what in ("runs", "cells"))
     amount, missing = counted(n, "run"), []
     if n < planned:
-        amount = f"{n:,} of {planned:,} runs so far"
-        missing.append(amount)
+        amount = f"{n:,} of {planned:,} runs"
+        if whole < planned:
+            amount += " so far"
+            missing.append(amount)
     if there < cells:
         missing.append(f"{cells - there:,} of {counted(cells, 'combination')} without a finished run")
     if failed := failures(store, sweeps):

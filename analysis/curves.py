@@ -47,7 +47,7 @@ def _draw(store: Results, chosen: Selection, parameter: str, name: str, success:
     title, whose = WHOSE[success]
     shows = (
         f"Fraction of runs {whose.format(what=what)}, by {TITLES[parameter]}; "
-        f"all other parameters pooled. n = {n:,} runs of {', '.join(chosen.sweeps)}; {POOLED}."
+        f"all other parameters pooled. n = {n:,} runs of {chosen.source}; {POOLED}."
     )
     return FigureResult(
         f"{name}-{chosen.robot}",

@@ -76,7 +76,7 @@ def _draw(store: Results, chosen: Selection, task: str, ends: tuple[pd.DataFrame
     shows = (
         f"Mean diversity of the populations after each evaluation from the fifth on, of the {len(ends[0])} best and as many "
         f"worst combinations on task {task_title(chosen.robot, task)}, ranked by success at the last evaluation. Thin: each "
-        f"combination; thick: their mean; {bands}. n = {n:,} runs of {', '.join(chosen.sweeps)}."
+        f"combination; thick: their mean; {bands}. n = {n:,} runs of {chosen.source}."
     )
     data = pd.concat([frame.assign(which=which) for which, frame in pooled.items()])
     return FigureResult(

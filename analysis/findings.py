@@ -124,7 +124,7 @@ def _drawn(store: Results, chosen: Selection, table: pd.DataFrame) -> FigureResu
         f"interval (bootstrap over seeds, or Wilson). Agrees: the interval is within 5, or 20 % of the dissertation's value, of "
         f"it; differs: it lies outside; undecided: neither yet. Orders agree if they hold in 95 % of the bootstrap samples, and "
         f"differ if in 5 %. The dissertation's numbers come from 500 combinations of 30 runs; these from n = {chosen.n:,} runs "
-        f"of {', '.join(chosen.sweeps)}."
+        f"of {chosen.source}."
     )
     return FigureResult(
         f"{NAME}-{chosen.robot}", "What the dissertation found, and these results", None, shows, chosen.n, chosen.sweeps,

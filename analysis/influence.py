@@ -80,7 +80,7 @@ def _draw(store: Results, chosen: Selection) -> FigureResult:
         f"dissertation's measure: the largest gap between the curves of its values. (b) Functional analysis of variance: "
         f"fraction of the variance between combinations at the last evaluation that it explains alone, corrected for chance. (c) "
         f"Permutation: how much of its R² a regression tree loses on seeds it has not seen, when the values are shuffled. "
-        f"n = {n:,} runs of {', '.join(chosen.sweeps)}, {rows.seeds.max()} seeds."
+        f"n = {n:,} runs of {chosen.source}, {rows.seeds.max()} seeds."
     )
     return FigureResult(
         f"{NAME}-{chosen.robot}", "Influence of the parameters", figure, shows, n, chosen.sweeps,

@@ -65,7 +65,7 @@ def _draw(store: Results, chosen: Selection) -> FigureResult:
     shows = (
         f"Fraction of runs whose fittest controller visits all goals within {RADIUS_CM} cm, of the best "
         f"{max(map(len, tops.values()))} combinations of each task, each by itself and all together; bands are {BOOTSTRAP}. "
-        f"n = {n:,} runs of {', '.join(chosen.sweeps)}. The best are picked by success at the last evaluation, so their success "
+        f"n = {n:,} runs of {chosen.source}. The best are picked by success at the last evaluation, so their success "
         "is overestimated."
     )
     see = " ".join(_half(task_title(chosen.robot, task), line) for task, line in lines.items())

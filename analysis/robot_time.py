@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from analysis.intervals import wilson
+from analysis.intervals import bootstrap, wilson
 
 LASTING = 3
 """Evaluations in a row whose fittest controller succeeds: what counts as success that lasts."""
@@ -31,6 +31,19 @@ def success_by_minute(evals: pd.DataFrame, minutes: Sequence[float] | np.ndarray
     table = table[table.runs > 0]
     low, high = wilson(table.successes, table.runs)
     return table.assign(low=low, high=high)
+
+
+def over_seeds(rows: pd.DataFrame, by_seed: Sequence[pd.DataFrame], at: str) -> pd.DataFrame:
+    """The rows (column ``at``, runs, successes, low, high) with each interval at least as wide as that of a bootstrap over seeds.
+
+    ``by_seed``: the same rows of each seed's runs alone. From fewer than `FEWEST_SEEDS` seeds they stay as they are.
+    """
+    sums, counts = (
+        np.array([one.set_index(at)[name].reindex(rows[at], fill_value=0) for one in by_seed], float)
+        for name in ("successes", "runs")
+    )
+    low, high = bootstrap(sums, counts)
+    return rows.assign(low=np.fmin(rows.low, low), high=np.fmax(rows.high, high))
 
 
 def of_latest(evals: pd.DataFrame, count: int = LATEST) -> pd.Series:

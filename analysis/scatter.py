@@ -150,7 +150,7 @@ def described(
     )
     shows = (
         f"{what}; one dot per task and combination of {', '.join(SHORT.values())} ({runs} each, n = {n:,} runs of "
-        f"{', '.join(chosen.sweeps)})."
+        f"{chosen.source})."
     )
     missing = (*said.missing, *thinned, *chosen.left_out)
     return FigureResult(f"{name}-{chosen.robot}", title, figure, shows, n, chosen.sweeps, missing, see=see, data=rows)

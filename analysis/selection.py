@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,8 +18,6 @@ READINGS = "readings"
 """Names of the sweeps that compare readings of the dissertation begin so: at settings of their own, whatever else they vary."""
 WORLDS = "worlds"
 """Names of the sweeps that run the same combinations in several worlds begin so."""
-APPROACHES = "approaches"
-"""Names of the sweeps that compare approaches begin so."""
 SETTING = (
     *("approach", "world", "world_digest", "training_algorithm", "evaluations", "min_commands", "max_commands"),
     *("generations_per_evaluation", "training_iterations_per_evaluation", "engine"),
@@ -39,6 +37,13 @@ class Selection:
     setting: str
     n: int
     left_out: tuple[str, ...]
+    approach: str = ""
+    """What is counted, in words, where finished runs of ``sweeps`` have several approaches."""
+
+    @property
+    def source(self) -> str:
+        """Where the runs come from, for captions."""
+        return ", ".join(self.sweeps) + (f" ({self.approach})" if self.approach else "")
 
     @property
     def sql(self) -> str:
@@ -87,16 +92,41 @@ def comparing(store: Results, parameter: str | None = None) -> list[str]:
 def _selection(store: Results, robot: str, groups: pd.DataFrame, sweeps: Sequence[str]) -> Selection:
     chosen = groups.drop_duplicates("task")
     setting = " OR ".join(f"({_equals(row)})" for row in chosen[["robot", "task", *SETTING]].to_dict("records"))
+    drawn = {str(row["task"]): row for row in chosen.to_dict("records")}
+    others = groups.drop(chosen.index).to_dict("records")
     left_out = tuple(
-        f"{counted(row.n, 'run')} of {row.task} with {row.evaluations} evaluations, "
-        f"{row.generations_per_evaluation} generations and {row.training_iterations_per_evaluation} "
-        "iterations each, or of another world, engine or other bounds, left out"
-        for row in groups.drop(chosen.index).itertuples()
+        text for task, row in drawn.items() for text in _left_out(row, [one for one in others if one["task"] == task])
     )
     tasks = tuple(sorted(chosen.task, key=lambda task: task_order(robot, task)))
     rows = store.query(f"SELECT DISTINCT sweep FROM {RUNS} WHERE {among('sweep', sweeps)} AND status = 'ok' AND ({setting})")
     own = tuple(sweep for sweep in sweeps if sweep in set(rows.sweep))
-    return Selection(robot, tasks, own, setting, int(chosen.n.sum()), left_out)
+    several = groups.approach.nunique() > 1
+    approach = _approach_drawn({task: str(row["approach"]) for task, row in drawn.items()}) if several else ""
+    return Selection(robot, tasks, own, setting, int(chosen.n.sum()), left_out, approach)
+
+
+def _left_out(drawn: dict[Hashable, Any], others: Sequence[dict[Hashable, Any]]) -> Iterator[str]:
+    """What is left out of one task, and why: rows of numbers of runs, each at another setting than ``drawn``."""
+    alike = [row for row in others if all(row[name] == drawn[name] for name in SETTING if name != "approach")]
+    if alike:
+        names = in_order(row["approach"] for row in alike)
+        which = f"another approach, {names[0]}," if len(names) == 1 else f"other approaches, {', '.join(names)},"
+        yield f"{counted(sum(row['n'] for row in alike), 'run')} of {drawn['task']} with {which} left out"
+    for row in others:
+        if row not in alike:
+            approach = f"another approach ({row['approach']}), " if row["approach"] != drawn["approach"] else ""
+            yield (
+                f"{counted(row['n'], 'run')} of {row['task']} with {row['evaluations']} evaluations, "
+                f"{row['generations_per_evaluation']} generations and {row['training_iterations_per_evaluation']} iterations "
+                f"each, or of {approach}another world, engine or other bounds, left out"
+            )
+
+
+def _approach_drawn(by_task: dict[str, str]) -> str:
+    """The approach of each task's runs, in words."""
+    if len(set(by_task.values())) == 1:
+        return f"approach {next(iter(by_task.values()))}"
+    return "approaches " + ", ".join(f"{approach} for {task}" for task, approach in by_task.items())
 
 
 def _why_none(store: Results, sweeps: Sequence[str], parameter: str | None) -> str:

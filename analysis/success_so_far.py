@@ -50,7 +50,7 @@ def _draw(store: Results, chosen: Selection) -> FigureResult:
     note(figure, "; ".join((f"Success: {what}", *said.sentences, POOLED)) + ".")
     shows = (
         f"Fraction of runs in which the fittest controller, driven after this evaluation, {what}, and of those in which it has "
-        f"done so after this or an earlier one; all combinations together, n = {chosen.n:,} runs of {', '.join(chosen.sweeps)}; "
+        f"done so after this or an earlier one; all combinations together, n = {chosen.n:,} runs of {chosen.source}; "
         f"{POOLED}."
     )
     return FigureResult(

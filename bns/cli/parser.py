@@ -17,17 +17,19 @@ class Parser(argparse.ArgumentParser):
     """`argparse.ArgumentParser` with suggestions.
 
     ``rewrite``: from the words of the command line to what they are written as today, for spellings that are on their way out.
+    ``words``: those that are being parsed.
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **{**options, "allow_abbrev": False})
         self.rewrite: Callable[[list[str]], list[str]] = list
+        self.words: list[str] = []
 
     def parse_known_args(  # type: ignore[override]  # only as it is called here
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> tuple[argparse.Namespace, list[str]]:
         """As its parent's, but nothing stays unknown, and help is a command's own, not that of ``bns``."""
-        words = self.rewrite(list(sys.argv[1:] if args is None else args))
+        words = self.words = self.rewrite(list(sys.argv[1:] if args is None else args))
         for word in self._own(words):
             if word.startswith("--") and len(word) > 2 and " " not in word:
                 self._check_option(word.partition("=")[0])
@@ -106,12 +108,35 @@ def _mark_files(parser: argparse.ArgumentParser, file: object, folder: object) -
 
 
 class OldFolder(argparse.Action):
-    """A folder that is written as an option today: it works, with a warning. ``metavar`` is the option."""
+    """A folder of results that is written as an option today: it works, with a warning. ``metavar`` is the option."""
 
     def __call__(self, parser: argparse.ArgumentParser, options: Any, value: Any, _name: str | None = None) -> None:
-        """Take the value over."""
+        """Take the value over, unless the option is given as well, or it names a figure and no folder."""
+        assert isinstance(parser, Parser)
+        figure = _is_figure(value)
+        if any(word.partition("=")[0] == self.metavar for word in parser.words):
+            name = value if figure else "NAME"
+            parser.error(
+                f"{value} has no meaning beside {self.metavar}, which gives the folder of results. Leave it out; "
+                f"to draw one figure alone: bns figures --only {name}."
+            )
+        if figure and not Path(value).is_dir():
+            parser.error(
+                f"{value} is the name of a figure, not a folder of results. To draw it alone: bns figures --only {value}."
+            )
         warn_old(parser.prog, str(value), f"{self.metavar} {value}")
         setattr(options, self.dest, Path(value))  # no `type`: that would convert the absence, too
+
+
+def _is_figure(word: str) -> bool:
+    """Does a script that came with this package, or an installed package, draw a figure of that name?"""
+    from bns.registry import FIGURES
+    from bns.shipped import shipped_root
+
+    root = shipped_root("analysis")
+    scripts = (root / "analysis").glob("*.py") if root else ()
+    line = f'NAME = "{word}"'
+    return FIGURES.is_plugin(word) or any(line in script.read_text(encoding="utf-8").splitlines() for script in scripts)
 
 
 def warn_old(command: str, old: str, new: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -19,6 +20,7 @@ from bns.measurements import write_measurements
 from bns.spec import RunSpec, parameters_in
 from bns.trial.driver import REPEATED, Stuck
 from bns.trial.evaluation import Evaluation
+from bns.trial.table_lines import moving_away, rows_before_odd
 
 JOURNAL, MEASUREMENTS, REPEATS = "journal.jsonl", "measurements.csv", "repeats.csv"
 
@@ -78,17 +80,20 @@ class TrialFolder:
 
 
 def check_not_lost(journal: Path) -> None:
-    """HardwareError if a table of measurements lies where the journal is gone: a new trial would write over it."""
-    table = journal.with_name(MEASUREMENTS)
-    if table.exists() and not journal.exists():
-        raise HardwareError(
-            f"{table} is there, and {journal.name}, from which it was made, is gone. Restore the journal from a copy to resume "
-            "the trial. To start anew, move the folder away: what was measured is in that table alone (bns compare reads it)."
-        )
+    """HardwareError if tables of a trial lie where the journal is gone: a new trial would write over them."""
+    left = [path for path in (journal.with_name(MEASUREMENTS), journal.with_name(REPEATS)) if path.exists()]
+    if not left or journal.exists():
+        return
+    compare = f" It can still be compared (bns compare --model M {shlex.quote(str(left[0]))})."
+    compared = compare if left[0].name == MEASUREMENTS else ""
+    raise HardwareError(
+        f"{left[0]} is there, and {journal.name}, from which it was made, is gone: what was measured is in that table alone."
+        f"{compared} Restore the journal from a copy to resume the trial; to start anew, move the folder {journal.parent} away."
+    )
 
 
 def check_not_cut(journal: Path) -> None:
-    """HardwareError if the table of measurements in its folder has more rows than a journal holds.
+    """HardwareError if the table of measurements in its folder has more rows than a journal holds, or others.
 
     Numbers and checksums of lines do not show that lines at the end are lost; and a trial that goes on writes over the table.
     """
@@ -99,18 +104,22 @@ def check_not_cut(journal: Path) -> None:
         lines = table.read_bytes().split(b"\n")[:-1]
     except OSError as error:
         raise HardwareError(f"cannot read {table}: {error}. It is compared with the journal; make it readable.") from error
-    moved = f"mv {table} {table.with_suffix('.old.csv')}"
-    odd = next((n for n, line in enumerate(lines, 1) if line.count(b",") != lines[0].count(b",")), 0)
-    if odd:
-        raise HardwareError(
-            f"line {odd} of {table} is no row of measurements. The table is made from the journal; move it away, and it is made "
-            f"again: {moved}"
-        )
-    if (kept := len(lines) - 1) > (held := len(measured(journal))):
+    if not lines:
+        return
+    rows = measured(journal)
+    held, kept = len(rows), len(lines) - 1
+    good = rows_before_odd(lines, list(zip(rows["trial"], rows["t_s"], strict=True)) if held else [])
+    if good > held:
         raise HardwareError(
             f"{journal} has lost its last lines, or was cut: it holds {held} rows of measurements, {table.name} in the same "
-            f"folder {kept}. Restore the journal from a copy. Or move the table away, which alone has what was measured after "
-            f"row {held}, and resume from where the journal ends: {moved}"
+            f"folder {kept}. If lines were lost, restore the journal from a copy: what was measured after row {held} is in that "
+            "table alone. If the journal was cut above a damaged line, or rows were added to the table, move the table away and "
+            f"resume; it is made again from the journal: {moving_away(table)}"
+        )
+    if good < kept:
+        raise HardwareError(
+            f"line {good + 2} of {table} is no row of measurements of this trial (its journal holds {held} rows, the table "
+            f"{kept}). The table is made from the journal; move it away and resume, and it is made again: {moving_away(table)}"
         )
 
 

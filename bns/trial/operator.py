@@ -98,7 +98,9 @@ class TerminalOperator:
     def _asked(self, question: str) -> str:
         try:
             return self._ask(question).strip().lower()
-        except (EOFError, KeyboardInterrupt) as error:
+        except EOFError as error:
+            raise TrialPausedError("paused by the operator, whose input has ended (with --yes, nobody is asked)") from error
+        except KeyboardInterrupt as error:
             raise TrialPausedError("paused by the operator") from error
 
     def _answer(self, question: str, words: dict[str, str]) -> str:

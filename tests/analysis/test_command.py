@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from analysis.__main__ import figures, main
 from analysis.intervals import wilson
 from analysis.publish import KINDS, captions
 from analysis.results import Results
+from bns.cli.main import main as bns
 from bns.errors import StoreError
 from bns.spec import RunSpec
 from bns.store import Writer, query
@@ -163,3 +165,41 @@ def test_figures_are_listed_without_waiting_for_the_compiler():
     listing = "import sys; from analysis.__main__ import figures; assert len(figures()) > 15; print('numba' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", listing], capture_output=True, text=True, check=True, cwd=ROOT)
     assert done.stdout.strip() == "False"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["bogusname", "--results", "there"], ["--results", "there", "bogusname"], ["bogusname", "--results=there"]],
+)
+@pytest.mark.parametrize("command", ["figures", "watch"])
+def test_a_word_beside_the_folder_of_results_is_refused(command, words, capsys):
+    with pytest.raises(SystemExit) as ended:
+        bns([command, *words])
+    assert ended.value.code == 2
+    said = capsys.readouterr().err
+    assert "bogusname has no meaning beside --results" in said
+    assert "bns figures --only NAME" in said
+    assert "old spelling" not in said
+
+
+@pytest.mark.parametrize("words", [["approaches"], ["success-by-mutation", "--results", "there"]])
+def test_the_name_of_a_figure_is_told_to_be_written_behind_only(words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        bns(["figures", *words])
+    assert ended.value.code == 2
+    assert f"bns figures --only {words[0]}" in capsys.readouterr().err
+
+
+def test_a_folder_with_the_name_of_a_figure_is_a_folder(tmp_path, monkeypatch, capsys):
+    (tmp_path / "approaches").mkdir()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("bns.plotting.scripts.carry_out", lambda results, *options: 0 if results == Path("approaches") else 1)
+    assert bns(["figures", "approaches"]) == 0
+    assert "write --results approaches" in capsys.readouterr().err
+
+
+def test_the_pages_name_figures_behind_only():
+    pages = [*(ROOT / "docs").rglob("*.md"), *(ROOT / "sweeps").glob("*.yaml"), *(ROOT / "bns" / "examples").rglob("*.md")]
+    for page in (*pages, ROOT / "README.md", ROOT / "Makefile", ROOT / "CHANGELOG.md"):
+        assert not re.search(r"bns figures [a-z]+[-a-z]*[ `\n]", page.read_text()), page

@@ -9,6 +9,7 @@ from store.synthetic import failed, make_store, record
 
 from analysis import checks, findings, one_run, success_by_mutation, success_by_population, trials
 from analysis.__main__ import figures, main
+from analysis.coverage import coverage
 from analysis.publish import captions
 from analysis.results import NoDataError, Results
 from analysis.selection import selections
@@ -164,3 +165,48 @@ def selections_then_rank(results):
 
     store = Results(results)
     return ranking(store, selections(store)[0])
+
+
+def of_approaches(*names: str, **values) -> list:
+    return [record(RunSpec(approach=name, seed=s, evaluations=6, mutation_rate=r, **values)) for name in names
+            for s in range(5) for r in (0.1, 0.5)]  # fmt: skip
+
+
+def test_the_approach_that_is_drawn_is_named_where_there_are_others_and_is_why_they_are_left_out(tmp_path):
+    written(tmp_path, "grid", of_approaches("bns", "bns+margin=0.03", "on-robot"))
+    drawn = success_by_mutation.draw(Results(tmp_path))[0]
+    assert drawn.n == 10
+    assert "n = 10 runs of grid (approach bns);" in drawn.shows
+    assert drawn.missing == ("20 runs of circle with other approaches, bns+margin=0.03, on-robot, left out",)
+
+
+def test_an_approach_is_not_the_only_reason_where_more_differs(tmp_path):
+    written(tmp_path, "grid", [*of_approaches("bns", "on-robot"), *of_approaches("on-robot", world="physics")])
+    missing = success_by_mutation.draw(Results(tmp_path))[0].missing
+    assert "10 runs of circle with another approach, on-robot, left out" in missing
+    assert any("or of another approach (on-robot), another world, engine or other bounds" in text for text in missing)
+
+
+def test_an_approach_that_is_the_only_one_is_not_named(tmp_path):
+    written(tmp_path, "grid", of_approaches("on-robot"))
+    assert "n = 10 runs of grid;" in success_by_mutation.draw(Results(tmp_path))[0].shows
+
+
+def test_each_task_names_its_own_approach(tmp_path):
+    made = [*of_approaches("bns", "on-robot"), *of_approaches("on-robot", task="infinity")]
+    written(tmp_path, "grid", made)
+    assert "(approaches bns for circle, on-robot for infinity)" in success_by_mutation.draw(Results(tmp_path))[0].shows
+
+
+def test_a_finished_sweep_of_which_a_part_is_drawn_is_not_under_way(tmp_path):
+    text = """
+name: grid
+robot: khepera
+seeds: 5
+fixed: {evaluations: 6}
+grid: {approach: [bns, on-robot], mutation_rate: [0.1, 0.5]}
+"""
+    written(tmp_path, "grid", of_approaches("bns", "on-robot"), sweep_text=text, sweep_runs=20)
+    said = coverage(Results(tmp_path), ["grid"], 10)
+    assert (said.amount, said.missing) == ("10 of 20 runs", ())
+    assert coverage(Results(tmp_path), ["grid"], 20).amount == "20 runs"

@@ -7,6 +7,7 @@ from scipy.stats import mannwhitneyu
 
 from analysis import approach_pairs, approach_summary, approaches
 from analysis.approach_pairs import compared, improvement, pairs, scores
+from analysis.intervals import bootstrap, wilson
 from analysis.results import NoDataError, Results
 from bns.spec import RunSpec
 from bns.store.archive.write import archive
@@ -56,7 +57,7 @@ def test_a_run_scores_its_late_successes_and_when_success_began_to_last():
 def test_only_seeds_that_both_have_are_compared_and_five_are_needed():
     seeds = {"a": range(6), "b": range(1, 6), "c": range(1, 5)}
     rows = [(name, seed, seed + (name == "b")) for name, own in seeds.items() for seed in own]
-    runs = pd.DataFrame(rows, columns=["approach", "seed", "late"]).assign(task="t", minutes=-1.0)
+    runs = pd.DataFrame(rows, columns=["approach", "seed", "late"]).assign(task="t", minutes=-1.0, setting=0)
     table = pairs(runs)
     assert table[["one", "other", "runs"]].to_numpy().tolist() == [["a", "b", 5]]
     assert pairs(runs[runs.seed < 4]).empty
@@ -125,3 +126,76 @@ def test_a_stopped_sweep_without_a_whole_seed_has_no_table(tmp_path):
 def of_one(results):
     written(results, "approaches-one", [with_evals(RunSpec(seed=seed, evaluations=3)) for seed in range(2)])
     return Results(results)
+
+
+def runs_at_rates(seeds, rates=(0.1, 0.3), names=("bns", "on-robot"), begins=None):
+    """Runs of approaches at each mutation rate; ``begins``: the evaluation that a (name, rate) succeeds from, else never."""
+    runs = []
+    for seed in seeds:
+        for name in names:
+            for rate in rates:
+                success = np.arange(1, 10) >= (begins or {}).get((name, rate), 99)
+                spec = RunSpec(approach=name, seed=seed, evaluations=9, mutation_rate=rate)
+                runs.append(with_evals(spec, success=success, success_7cm=success, robot_s=60.0 * np.arange(1, 10)))
+    return runs
+
+
+ALL_FIGURES = (approaches, approach_summary, approach_pairs)
+
+
+@pytest.mark.parametrize("archived", [False, True])
+def test_approaches_by_another_parameter_are_compared_whatever_the_sweep_is_called(tmp_path, archived):
+    written(tmp_path / "results", "mixed", runs_at_rates(range(6), begins={("bns", 0.1): 1, ("bns", 0.3): 1}))
+    place = archive(tmp_path / "results", tmp_path / "mixed.parquet").path if archived else tmp_path / "results"
+    for module in ALL_FIGURES:
+        (drawn,) = module.draw(Results(place, archived=archived))
+        assert drawn.n == 24
+        assert "Pooled over mutation rate (10 %, 30 %): each approach with the same combinations and seeds." in drawn.shows
+    assert drawn.data.iloc[0][["one", "other", "runs", "late_probability"]].tolist() == ["bns", "on-robot", 12, 1.0]
+
+
+def test_only_combinations_and_seeds_that_every_approach_has_are_pooled(tmp_path):
+    written(tmp_path, "mixed", runs_at_rates(range(6)))
+    written(tmp_path, "mixed", runs_at_rates(range(6, 9), rates=(0.1,), names=("bns",)))
+    written(tmp_path, "mixed", runs_at_rates(range(6), rates=(0.5,), names=("bns",)))
+    for module in ALL_FIGURES:
+        (drawn,) = module.draw(Results(tmp_path))
+        assert drawn.n == 24
+        assert "(10 %, 30 %)" in drawn.shows
+
+
+def test_approaches_that_share_no_other_parameter_are_not_compared_and_the_parameter_is_named(tmp_path):
+    written(tmp_path, "mixed", runs_at_rates(range(6), rates=(0.1,), names=("bns",)))
+    written(tmp_path, "mixed", runs_at_rates(range(6), rates=(0.3,), names=("on-robot",)))
+    for module in (approaches, approach_summary):
+        with pytest.raises(NoDataError, match="no seed has a run of every approach with the same mutation rate; "):
+            module.draw(Results(tmp_path))
+    with pytest.raises(NoDataError, match="5 runs each on the same task and seeds, with every mutation rate; "):
+        approach_pairs.draw(Results(tmp_path))
+
+
+def test_approaches_on_different_tasks_are_not_compared(tmp_path):
+    made = [with_evals(RunSpec(approach="bns", task="circle", evaluations=3))]
+    made += [with_evals(RunSpec(approach="on-robot", task="infinity", evaluations=3))]
+    written(tmp_path, "mixed", made)
+    with pytest.raises(NoDataError, match="no sweep has runs of two approaches on the same robot, task and world"):
+        approaches.draw(Results(tmp_path))
+
+
+def test_pooled_runs_of_a_seed_are_one_draw(tmp_path):
+    # At both rates bns succeeds on seeds 0 to 3 of 8: eight runs of 16, but the luck of eight seeds alone.
+    made = runs_at_rates(range(4), begins={("bns", 0.1): 1, ("bns", 0.3): 1}) + runs_at_rates(range(4, 8))
+    written(tmp_path, "mixed", made)
+    (drawn,) = approaches.draw(Results(tmp_path))
+    bns = drawn.table.set_index("approach").loc["bns"]
+    low, high = bootstrap(np.repeat([2.0, 0.0], 4), np.full(8, 2.0))
+    assert (bns["low (%)"], bns["high (%)"]) == (round(100 * float(low)), round(100 * float(high)))
+    assert float(wilson(8, 16)[0]) > float(low)
+    assert "bootstrap intervals over seeds" in drawn.shows
+
+
+def test_seeds_are_exchanged_together_at_all_settings():
+    one, other = np.arange(6.0) + 10, np.arange(6.0)
+    alone = compared({"t": (one, other)})
+    assert compared({"t": (np.stack([one] * 3), np.stack([other] * 3))}) == pytest.approx(alone)
+    assert compared(dict.fromkeys("abc", (one, other)))["p"] < alone["p"]  # other tasks are independent

@@ -8,6 +8,7 @@ without checksums, or nothing.
 from __future__ import annotations
 
 import re
+import shlex
 import warnings
 import zlib
 from pathlib import Path
@@ -94,8 +95,8 @@ def _text(path: Path, number: int, line: bytes, unsealed: int) -> str:
 def _wrong(path: Path, number: int, what: str, unsealed: int) -> HardwareError:
     checked = number - 1 > unsealed  # the line before it is as it was written, and so are all above that
     below = (
-        f" Everything above it can be resumed: head -n {number - 1} {path} > FILE, in its place, once the measurements.csv "
-        "beside it is moved away."
+        f" Everything above it can be resumed: head -n {number - 1} {shlex.quote(str(path))} > FILE, in its place, once the "
+        "measurements.csv beside it is moved away."
         if checked
         else ""
     )

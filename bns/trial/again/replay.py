@@ -54,17 +54,23 @@ def replayed(journal: Path, results: Path) -> Replayed:
     past = past_evaluations(journal)
     if not past:
         raise HardwareError(f"{journal} holds no evaluation that was driven; there is nothing to replay.")
-    spec = replace(spec_of(journal), evaluations=len(past))
+    asked = spec_of(journal)
+    spec = replace(asked, evaluations=len(past))
     began, started = time.perf_counter(), datetime.now(UTC)
     with live_view(spec) as show, BackgroundDriver(load_robot(spec.robot), _NoRobot(), past, most_rounds=1) as driver:
         result = run(spec, show, RobotWorld("robot-replayed"), driver)
     wall_s = time.perf_counter() - began
     keep_run(spec, result, results, SWEEP, started, wall_s)
     evals = result.tables["evals"]
-    cut = "" if any(events(journal, "complete")) else "; the journal has no line `complete`: the trial did not come to its end"
+    stored = len(evals["evaluated_fitness_world"])
+    ended = any(events(journal, "complete"))
+    cut = (
+        f": {stored} of the {asked.evaluations} evaluations of an unfinished trial; the journal has no line `complete`: "
+        "the trial did not come to its end"
+    )
     text = (
         f"replayed {len(past)} evaluations of {journal}, run {spec.run_id}: fitness of the last in the world "
         f"{evals['evaluated_fitness_world'][-1]:.4f}, goals reached {evals['evaluated_goals_reached'][-1]}; "
-        f"stored in sweep {SWEEP}{cut}"
+        f"stored in sweep {SWEEP}{'' if ended else cut}"
     )
     return Replayed(spec, result, wall_s, text)

@@ -151,6 +151,15 @@ def test_a_pause_at_the_question_discards_what_was_driven(trial, answer):
     assert measured(on.journal)["discarded"].unique().tolist() == [1]
 
 
+def test_a_real_robot_does_not_drive_where_nobody_can_answer(trial, monkeypatch):
+    on = trial([])
+    monkeypatch.setattr("sys.stdin", io.StringIO(""))
+    on.driver._operator = session._somebody(TrialSetup(shipped_rig("khepera")), Stopping())
+    with pytest.raises(TrialPausedError, match=r"whose input has ended \(with --yes, nobody is asked\)"):
+        on.driver.evaluate(1, COMMANDS)
+    assert kinds(on, "driven", "command") == []
+
+
 def test_the_question_comes_with_the_picture_of_what_was_driven(trial):
     on = trial(["", ""])
     on.driver.evaluate(1, COMMANDS)

@@ -146,9 +146,11 @@ def test_a_journal_of_a_trial_that_was_cut_short_is_said_to_be_so(tmp_path, monk
     monkeypatch.setattr("bns.trial.again.replay.keep_run", lambda *_: None)
     journal = tmp_path / "journal.jsonl"
     with HardwareLog(journal, EmulatedClock(1.0)) as log:
-        log.note("trial", spec=spec_event(RunSpec(world="robot")))
+        log.note("trial", spec=spec_event(RunSpec(world="robot", evaluations=30)))
         log.note("driven", evaluation=1, picked=[[1, 1, 1]], commands=[[1, 1, 1]], poses=[[0, 0, 0], [0, 0, 0]])
         log.note("evaluated", evaluation=1, rounds=1)
         if ends:
             log.note("complete", evaluations=1)
-    assert replayed(journal, tmp_path).text.endswith(said)
+    text = replayed(journal, tmp_path).text
+    assert text.endswith(said)
+    assert ("1 of the 30 evaluations of an unfinished trial" in text) is not ends

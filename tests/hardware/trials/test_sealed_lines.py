@@ -2,6 +2,7 @@
 
 import json
 import re
+import subprocess
 
 import numpy as np
 import pytest
@@ -91,6 +92,19 @@ def test_what_the_message_says_to_keep_is_all_that_stands_above_the_change(log):
         assert kept == (changed if changed else 0)
         log.write_bytes(b"".join(data.splitlines(keepends=True)[:kept]))
         assert data_of(log) == [f"D,{number},{number}" for number in range(kept)]
+
+
+def test_what_the_message_says_to_keep_is_a_command_whatever_the_folder_is_called(log, tmp_path):
+    folder = tmp_path / "my results"
+    folder.mkdir()
+    lines = log.read_text().splitlines(keepends=True)
+    odd = folder / log.name
+    odd.write_text("".join([*lines[:6], *lines[7:]]))
+    with pytest.raises(HardwareError) as refused:
+        data_of(odd)
+    command = re.search(r"head -n .* > FILE", str(refused.value))[0]
+    subprocess.run(["bash", "-c", command], cwd=tmp_path, check=True)
+    assert (tmp_path / "FILE").read_text() == "".join(lines[:6])
 
 
 def test_last_line_without_an_end_is_passed_over_and_gone_on_after(log):

@@ -18,6 +18,7 @@ from rich.console import Console
 from bns.console import view
 from bns.hardware.link.hardware_log import events
 from bns.trial.folder import past_evaluations
+from bns.trial.table_lines import moving_away
 
 from .. import soak
 from .calls import TRIAL, call, evaluated, faults, journal_of
@@ -116,8 +117,12 @@ def test_measurements_whose_journal_is_gone_are_not_written_over(tmp_path, capsy
     journal.unlink()
     for way in ([], ["--resume"]):
         assert call(*asked, *way) == 2
-        assert "journal.jsonl, from which it was made, is gone" in capsys.readouterr().err
+        said = capsys.readouterr().err
+        assert f"{table} is there, and journal.jsonl, from which it was made, is gone" in said
+        assert f"move the folder {journal.parent} away" in said
         assert table.read_bytes() == kept
+    compare = re.search(r"bns (compare \S+ \S+ \S+csv)", said)[1].replace(" M ", " khepera ")
+    assert call(*compare.split()) == 0
     journal.parent.rename(tmp_path / "away")
     assert call(*asked) == 0
 
@@ -154,6 +159,75 @@ def test_a_line_of_the_table_that_is_none_is_named_and_the_journal_is_not_blamed
     assert "lost its last lines" not in said
     subprocess.run(re.search(r"mv \S+ \S+", said)[0].split(), check=True)
     assert call(*asked, "--resume") == 0
+
+
+@pytest.mark.parametrize("way", [[], ["--resume"]])
+def test_repeats_whose_journal_is_gone_are_not_written_over(tmp_path, capsys, way):
+    asked, journal = paused(tmp_path)
+    journal.with_name("measurements.csv").unlink()
+    journal.rename(journal.with_name("repeats.csv"))
+    assert call(*asked, *way) == 2
+    said = capsys.readouterr().err
+    assert f"{journal.with_name('repeats.csv')} is there, and journal.jsonl, from which it was made, is gone" in said
+    assert "bns compare" not in said
+
+
+def end_doubled(lines):
+    return [*lines, lines[-1]]
+
+
+def words_in_cells(lines):
+    return [*lines, ",".join(["garbage"] * len(lines[0].split(",")))]
+
+
+def middle_doubled(lines):
+    return [*lines[:9], *lines[8:]]
+
+
+def row_taken_out(lines):
+    return [*lines[:9], *lines[10:]]
+
+
+def names_changed(lines):
+    return [lines[0].replace("t_s", "time", 1), *lines[1:]]
+
+
+@pytest.mark.parametrize(
+    ("change", "line"),
+    [(end_doubled, -1), (words_in_cells, -1), (middle_doubled, 10), (row_taken_out, 10), (names_changed, 1)],
+)
+def test_a_table_that_is_not_the_journal_s_is_moved_away_as_advised(tmp_path, capsys, change, line):
+    asked, journal = paused(tmp_path)
+    table = journal.with_name("measurements.csv")
+    lines = change(table.read_text().splitlines())
+    table.write_text("".join(f"{one}\n" for one in lines))
+    assert call(*asked, "--resume") == 2
+    said = capsys.readouterr().err
+    assert f"line {line if line > 0 else len(lines)} of {table} is no row of measurements of this trial" in said
+    assert "lost its last lines" not in said
+    subprocess.run(re.search(r"mv \S+ \S+", said)[0].split(), check=True)
+    assert call(*asked, "--resume") == 0
+    assert pd.read_csv(table)["t_s"].notna().all()
+
+
+def test_lines_lost_from_a_journal_are_said_also_below_a_table_with_garbage(tmp_path, capsys):
+    asked, journal = paused(tmp_path)
+    table = journal.with_name("measurements.csv")
+    journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:3]))
+    table.write_bytes(table.read_bytes() + b"garbage\n")
+    assert call(*asked, "--resume") == 2
+    said = capsys.readouterr().err
+    assert "has lost its last lines, or was cut: it holds 0 rows" in said
+    assert "what was measured after row 0 is in that table alone" in said
+
+
+def test_a_table_is_moved_to_a_name_that_is_free(tmp_path):
+    table = tmp_path / "a trial" / "measurements.csv"
+    table.parent.mkdir()
+    for text in ("first", "second", "third"):
+        table.write_text(text)
+        subprocess.run(["bash", "-c", moving_away(table)], check=True)
+    assert sorted(path.read_text() for path in table.parent.iterdir()) == ["first", "second", "third"]
 
 
 def test_the_summary_lists_which_planned_faults_happened(tmp_path, capsys):
