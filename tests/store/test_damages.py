@@ -41,6 +41,18 @@ def test_no_damage_goes_unnoticed_and_a_sweep_makes_up_for_each():
     assert sum(one.verdict == "named" for one in outcomes) >= 7
 
 
+def test_a_damaged_file_of_a_sweep_has_no_runs_and_is_written_again(tmp_path):
+    store(tmp_path, full(2))
+    path = files(tmp_path, "specs")[0]
+    path.write_bytes(path.read_bytes()[:-40])
+    with pytest.warns(StoreWarning, match=f"{path.name} is skipped: it is .* and the sweep writes it again"):
+        assert load(tmp_path, "specs").empty
+    with pytest.warns(StoreWarning, match=rf"{path.name} is set aside as .* It is written again"):
+        store(tmp_path, [])
+    assert len(load(tmp_path, "specs")) == 1
+    assert len(finished(tmp_path, "s")) == 2
+
+
 @pytest.mark.parametrize("table", ["evals", "paths", "generations", "probes"])
 def test_what_is_set_aside_is_run_again(tmp_path, table):
     store(tmp_path, full(2))

@@ -22,8 +22,9 @@ def set_aside_damaged(results: Path, sweep: str) -> list[Path]:
     moved = []
     for file in bad:
         moved.append(set_aside(results, file.path))
+        again = "It is written again" if "specs" in file.path.parts[-4:-1] else "Its runs are repeated"
         warnings.warn(
-            f"{file.path} is set aside as {moved[-1]}: {file.reason}. Its runs are repeated.",
+            f"{file.path} is set aside as {moved[-1]}: {file.reason}. {again}.",
             StoreWarning,
             stacklevel=4,
         )
