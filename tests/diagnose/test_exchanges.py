@@ -165,7 +165,7 @@ def test_no_explanation_competes_by_one_more_number_that_may_be_anything(monkeyp
     search._exchanges = SimpleNamespace(of=lambda *_: [("b", "c", tried)])
     monkeypatch.setattr(search, "_rejected", lambda *_, **__: "")
     monkeypatch.setattr(search, "_earned_over", lambda *_: True)
-    for name, answer in (("limiting", anything), ("indistinguishable", True), ("without", None)):
+    for name, answer in (("limiting", anything), ("indistinguishable", True), ("fit_without", None)):
         monkeypatch.setattr(stepwise, name, lambda *_, answer=answer: answer)
     found = search._competing_models(None, fit, ("a", "b", "d"))
     assert found == ([(("a", "c", "d"), tried)] if competes else [])
