@@ -142,6 +142,7 @@ def test_the_first_screen_has_the_effects_size_and_its_uncertainty_with_units(pa
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine; apt-get install chromium")
+@pytest.mark.slow
 @pytest.mark.parametrize(("verdict", "width"), [("effects", 1280), ("effects", 400), ("none", 400)])
 def test_a_browser_shows_it_without_an_error_and_the_slider_moves(page_of, tmp_path, verdict, width):
     probed = tmp_path / "probed.html"

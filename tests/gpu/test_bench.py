@@ -58,6 +58,7 @@ def test_memory_that_is_full_is_said(monkeypatch, capsys):
     assert "bench-gpu: nothing measured. CUDA_ERROR_OUT_OF_MEMORY" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_devices_are_compared_by_runs_of_both_robots(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(devices, "specs_of", tiny)
     path = tmp_path / "new" / "d.json"
