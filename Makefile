@@ -115,7 +115,7 @@ fuzz: setup ## files that nobody would write, for every reader of users' files, 
 ranking-check: setup ## how many runs `--until ranking` needs, and how often it finds the same winners: 100 studies of each kind, ten minutes
 	$(BIN)/python -m tests.sweep.ranking_study
 
-mutants: setup ## small faults planted in the rooms where numbers are made: do the tests notice? MINUTES=20; writes docs/mutants.md
+mutants: setup ## small faults planted in the modules where numbers are made: do the tests notice? MINUTES=20; writes docs/mutants.md
 	$(BIN)/pip install -q --disable-pip-version-check -c constraints.txt -e '.[mutants]'
 	$(BIN)/python -m tests.mutants --minutes $(or $(MINUTES),20)
 

@@ -24,7 +24,7 @@ _ONE_BY_ONE = 6
 
 
 def done(store: Results) -> str:
-    """SQL: run_id, sweep, `OTHERS` and cpu_s of the finished runs of all sweeps that have several approaches.
+    """SQL: run_id, sweep, `OTHERS` and cpu_s of the finished runs of all sweeps that have several approaches, each seed once.
 
     Raises:
         NoDataError: there is none.
@@ -36,7 +36,11 @@ def done(store: Results) -> str:
         raise NoDataError("no sweep has runs of two approaches that are finished; run bns sweep approaches-small")
     overhead = f"""coalesce(TRY_CAST(regexp_extract(spec, '"overhead_s":([0-9]+)', 1) AS INT), {FIELDS["overhead_s"].default})"""
     columns = ", ".join(f"{overhead} AS {name}" if name == "overhead_s" else name for name in OTHERS)
-    return f"(SELECT run_id, sweep, cpu_s, {columns} FROM {RUNS} WHERE status = 'ok' AND {among('sweep', sweeps)})"
+    version = """coalesce(TRY_CAST(regexp_extract(spec, '"approach_version":([0-9]+)', 1) AS INT), 1)"""
+    # Runs that differ in what they record alone, or in the version of their approach, are one run: it has one say.
+    return f"""(SELECT run_id, sweep, cpu_s, {columns} FROM {RUNS} WHERE status = 'ok' AND {among("sweep", sweeps)}
+        QUALIFY row_number() OVER (PARTITION BY {", ".join((*GROUP, "task", "approach", "seed"))}, {", ".join(OTHERS)}
+        ORDER BY {version} DESC, run_id) = 1)"""
 
 
 def with_settings(rows: pd.DataFrame) -> pd.DataFrame:

@@ -180,7 +180,7 @@ def checked(name: str, value: Any) -> Any:
     elif wanted is int and isinstance(value, float) and value.is_integer():
         value, fits = int(value), True
     if not fits:
-        raise SpecError(f"{name} is {value!r}; it must be {_allowed(name)}.")
+        raise SpecError(f"{name} is {value!r}; it must be {_allowed(name)}.{unquoted(value) if wanted is not str else ''}")
     if wanted is str:
         if meta["changes"] and (change := change_of(value)):
             _check_change(name, value, change)
@@ -196,6 +196,15 @@ def checked(name: str, value: Any) -> Any:
     if not math.isfinite(value) or (low is not None and value < low) or (high is not None and value > high):
         raise SpecError(f"{name} is {value!r}; it must be {_allowed(name)}.{_percent_hint(name, value)}")
     return value
+
+
+def unquoted(value: Any) -> str:
+    """What to do about a text that is a number, as a sentence behind an error; "" for all else."""
+    try:
+        float(value if isinstance(value, str) else "")
+    except ValueError:
+        return ""
+    return f" It is a text: write {value.strip()}, without quotes."
 
 
 def _check_change(name: str, value: str, change: Change) -> None:

@@ -37,21 +37,11 @@ def sweep_file(tmp_path):
     return file
 
 
-def test_run_stores_rows_draws_a_path_and_saves_its_networks(tmp_path, bns):
-    done = bns(
-        "run",
-        "--task",
-        "infinity",
-        "--seed",
-        3,
-        *QUICK,
-        "--results",
-        tmp_path,
-        "--save-snn",
-        tmp_path / "n.safetensors",
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stderr == ""
+def test_run_stores_rows_draws_a_path_and_saves_its_networks(tmp_path, capsys):
+    asked = ["run", "--task", "infinity", "--seed", "3", *QUICK, "--results", str(tmp_path)]
+    assert main([*asked, "--save-snn", str(tmp_path / "n.safetensors")]) == 0
+    done = capsys.readouterr()
+    assert done.err == ""
     evals = package.load(tmp_path)
     assert list(evals["evaluation"]) == [1, 2]
     assert {
@@ -64,7 +54,7 @@ def test_run_stores_rows_draws_a_path_and_saves_its_networks(tmp_path, bns):
         "success_20cm",
     } <= set(evals)
     assert set(evals["task"]) == {"infinity"}
-    figure = re.search(r"path: (\S+\.png)", done.stdout).group(1)
+    figure = re.search(r"path: (\S+\.png)", done.out).group(1)
     assert Path(figure).read_bytes()[:4] == b"\x89PNG"
     assert (tmp_path / "n.safetensors").is_file()
 
@@ -99,14 +89,13 @@ def test_physics_world_answers_otherwise_than_the_substitute(tmp_path):
     assert (fitness["physics"] != fitness["substitute"]).all()
 
 
-def test_sweep_status_query_compact(tmp_path, sweep_file, bns, capsys):
+def test_sweep_status_query_compact(tmp_path, sweep_file, capsys):
     results = tmp_path / "results"
     assert main(["sweep", str(sweep_file), "--dry-run", "--results", str(results)]) == 0
     assert "little: 8 runs, 0 done, 8 to do" in capsys.readouterr().out
     assert not results.exists(), "a dry run writes nothing"
-    done = bns("sweep", sweep_file, "--jobs", 2, "--results", results)
-    assert done.returncode == 0, done.stderr
-    assert "8 runs now, 8 of 8 done" in done.stderr
+    assert main(["sweep", str(sweep_file), "--jobs", "1", "--results", str(results)]) == 0
+    assert "8 runs now, 8 of 8 done" in capsys.readouterr().err
     assert main(["sweep", str(sweep_file), "--jobs", "1", "--results", str(results)]) == 0
     assert "0 runs now, 8 of 8 done" in capsys.readouterr().err
     assert main(["status", "--results", str(results)]) == 0
@@ -121,6 +110,7 @@ def test_sweep_status_query_compact(tmp_path, sweep_file, bns, capsys):
     pd.testing.assert_frame_equal(package.load(results), before)
 
 
+@pytest.mark.slow
 def test_one_and_two_jobs_and_a_resumed_sweep_give_the_same_rows(tmp_path, sweep_file):
     frames = []
     part = run_sweep(load_sweep(sweep_file), tmp_path / "resumed", limit=3, executor=SerialExecutor())
@@ -249,3 +239,16 @@ def test_a_gpu_has_no_worker_processes_of_its_own(tmp_path, sweep_file, capsys):
     assert main([*asked, "--executor", "joblib"]) == 2
     assert "and --executor joblib distributes runs over cores" in capsys.readouterr().err
     assert not (tmp_path / "r").exists()
+
+
+@pytest.mark.filterwarnings("default::bns.store.StoreWarning")
+def test_a_warning_is_printed_once_a_command(tmp_path, sweep_file, capsys):
+    run_sweep(load_sweep(sweep_file), tmp_path, executor=SerialExecutor())
+    for part in (tmp_path / "evals").rglob("*.parquet"):
+        part.write_bytes(part.read_bytes()[:-9])
+    for _ in range(2):
+        capsys.readouterr()
+        assert main(["status", "--results", str(tmp_path)]) == 0
+        said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("bns: warning: ")]
+        assert said
+        assert len(said) == len(set(said))

@@ -63,9 +63,11 @@ def test_a_run_and_a_sweep_do_not_wait_for_pandas(tmp_path):
     code = "import sys, bns.sweep.runner\nfrom bns.spec import RunSpec\nfrom bns.sweep.jobs.job import run_job\n"
     code += "record = run_job(RunSpec(evaluations=1, population_size=4, generations_per_evaluation=1))\n"
     code += "assert record.run['status'] == 'ok', record.run['error']\nprint(*sys.modules)"
-    for _ in range(2):  # the second time kernels lie compiled on the disk
+    for _ in range(2):  # the second time, where it is needed, kernels lie compiled on the disk
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path)
-    loaded = set(done.stdout.split())
+        loaded = set(done.stdout.split())
+        if "pandas" not in loaded:
+            break
     assert "numba" in loaded
     assert not {"pandas", "matplotlib"} & loaded
 

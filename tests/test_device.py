@@ -12,7 +12,7 @@ SWEEP = "name: few\nrobot: khepera\nseeds: 2\nfixed: {evaluations: 1, population
 NO_GPU = {"NUMBA_CUDA_DRIVER": "/nonexistent/libcuda.so", "CUDA_VISIBLE_DEVICES": ""}
 
 
-@pytest.mark.parametrize("what", ["run", "sweep"])
+@pytest.mark.parametrize("what", ["run", pytest.param("sweep", marks=pytest.mark.slow)])
 def test_without_a_driver(what, tmp_path, bns):
     (tmp_path / "few.yaml").write_text(SWEEP)
     done = bns(what, *(["few.yaml"] if what == "sweep" else []), "--device", "cuda", cwd=tmp_path, **NO_GPU)

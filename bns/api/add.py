@@ -114,8 +114,8 @@ def add(
         log: a file, a table, or `bns.Measurements`.
         effects: names of listed effects (`bns.effects`), Python files with an ``EFFECT``, `bns.Effect`, or several of these.
         model: `bns.Model`, or the name or file of one.
-        term: defines the one name given as a formula ("k * v * abs(w)"), added to the velocity ``on``: v, w, s, east or north.
-            It may use the log's further columns by name (docs/formulas.md).
+        term: defines the one name that is no listed effect's as a formula ("k * v * abs(w)"), added to the velocity ``on``: v, w,
+            s, east or north. It may use the log's further columns by name (docs/formulas.md).
         per_trial: an effect that may differ from trial to trial (clock-offset) has a separate value in each.
         progress: called with the fraction done (None if unknown) and a text.
 
@@ -127,13 +127,11 @@ def add(
     checked_progress(progress)
     if not wanted:
         raise ModelError("No effect is given; give at least one name of bns.effects().")
-    if term is not None and len(wanted) != 1:
-        names = ", ".join(map(_name, wanted))
-        raise ModelError(f"A formula needs one name, not {names}: {_FORMULA}.")
     robot = with_effects(model)
+    formula = None if term is None else _name_of_formula(wanted, robot)
     ready = prepared(log, robot)
     columns = getattr(ready.predictor.tracks, "extra", ())
-    chosen = [_effect(each, robot, term, on, columns) for each in wanted]
+    chosen = [_effect(each, robot, term if each == formula else None, on, columns) for each in wanted]
     given = [effect.name for effect, _ in chosen]
     twice = next((name for name in given if given.count(name) > 1), None)
     if twice is not None:
@@ -162,6 +160,20 @@ def _effect(
     wanted: Wanted, model: Model, term: str | None, on: str, columns: Iterable[str]
 ) -> tuple[Effect, Mapping[str, str]]:
     return (wanted, {}) if isinstance(wanted, Effect) else effect_from(fspath(wanted), model, term, on, columns)
+
+
+def _name_of_formula(wanted: Sequence[Wanted], model: Any) -> Wanted:
+    """The one name that is no listed effect's, or the only one that is given; ModelError if there is none, or are several."""
+    free = [one for one in wanted if not isinstance(one, Effect) and not fspath(one).endswith(".py")]
+    if len(wanted) > 1:
+        free = [one for one in free if fspath(one) not in model.catalogue()]
+    if len(free) != 1:
+        names = ", ".join(map(_name, wanted))
+        raise ModelError(
+            f"A formula needs one name of its own, beside any names of listed effects; given are {names}: {_FORMULA}. "
+            "A second formula goes into the model that the first one was added to."
+        )
+    return free[0]
 
 
 def _name(wanted: Wanted) -> str:

@@ -61,7 +61,7 @@ class ProposeResult(Shown):
     def model_pairs(self) -> pd.DataFrame:
         """One row per pair of explanations: first, second, power (probability of a decision), minutes (for one of 90 %),
         times_faster (than plain random commands), indistinguishable (no commands tell them apart), already_decided (so far),
-        independent_measurements."""
+        standard_errors (expected difference; 2 decide), independent_measurements."""
         return pd.DataFrame([vars(pair) for pair in self.proposal.model_pairs])
 
     @property

@@ -36,7 +36,7 @@ _NO_PLACE = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.EACC
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of ``bns``. Exit codes: 0 done, 1 some runs failed, 2 bad input, 130 interrupted, 143 terminated."""
     usable_streams()
-    warnings.showwarning = _show_warning
+    warnings.showwarning = _shown_once()
     try:
         options = _parser().parse_args(arguments)
         options.command_line = list(sys.argv[1:] if arguments is None else arguments)
@@ -73,8 +73,16 @@ def _flushed(code: int) -> int:
     return code
 
 
-def _show_warning(message: Warning | str, *_place: object, **_more: object) -> None:
-    print(f"bns: warning: {message}", file=sys.stderr)
+def _shown_once() -> Callable[..., None]:
+    """Prints warnings, each text once a command: several steps of one may meet the same file."""
+    said: set[str] = set()
+
+    def show(message: Warning | str, *_place: object, **_more: object) -> None:
+        if str(message) not in said:
+            said.add(str(message))
+            print(f"bns: warning: {message}", file=sys.stderr)
+
+    return show
 
 
 ABOUT = (

@@ -62,6 +62,14 @@ class Memory:
     tried: Tried | None = None
     windows: PairedWindows | None = None
 
+    def know(self, model: Model, problem: Problem, fit: Fit, effects: Iterable[Effect]) -> None:
+        """The fit of these effects to come is this one, with its numbers and its noise, as a diagnosis shows it already.
+
+        The effects as `fitting` scales them to the tracks. A fit that is begun elsewhere ends in nearly the same numbers, and one
+        error would be shown with two values.
+        """
+        self.fits[model.canonical_json(), False, frozenset(effects)] = Judged("", fit.model, problem.pose_filter), fit
+
 
 def effect_from(
     text: str, model: Model, term: str | None = None, on: str | None = None, columns: Iterable[str] = ()

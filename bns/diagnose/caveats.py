@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtr
 
+from bns.diagnose.data.stamps import stamp_scatter
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.data.variables import bare, label, velocity
 from bns.diagnose.estimate.cancelling import Cancelled, cancelled
@@ -37,6 +38,8 @@ WORST_SHARE = DEFAULTS.residuals.worst_share
 SHOWN = DEFAULTS.report.moments
 OFTEN = DEFAULTS.verdict.often
 FEWEST_CLOCKS = DEFAULTS.verdict.fewest_clocks
+DELAYS = ("command-delay", "clock-offset")
+"""Effects that the mean delay of poses that are stamped late looks like."""
 
 
 def notes_on(
@@ -67,7 +70,7 @@ def notes_on(
     if found.withdrawn:
         yield (
             f"{' with '.join(found.withdrawn)} would raise the likelihood, but not improve predictions of held-out trials "
-            "(root mean square on the same windows). So it is not presented as an explanation."
+            "(root mean square and median on the same windows). So it is not presented as an explanation."
         )
     yield from _on_slight(found.unseen, slight)
     known = known_effects(selection) if found.negligible else {}
@@ -91,17 +94,22 @@ def notes_on(
         values = ", ".join(f"{k} = {v:.4g}" for k, v in formula.values.items())
         said = f"{formula_in_words}: " if formula_in_words else ""
         yield f"A candidate term: {said}{formula.on} + {formula.term} with {values}."
-    yield from (f"What no listed effect explains behaves like this: {words}." for words in terms)
-    if found.terms and not (with_terms is not None and with_terms.rose_in_the_end):
+    if terms and with_terms is not None and with_terms.rose_in_the_end:
+        yield _on_rejected(terms, with_terms)
+    elif terms:
+        yield from (f"What no listed effect explains behaves like this: {words}." for words in terms)
         yield from map(_on_cancelling, cancelled(selection.fit, found.terms[0].fit, selection.accepted))
-    if terms and with_terms is not None and (with_terms.rose_in_the_end or not with_terms.falls):
-        yield _no_lower(with_terms)
+        if with_terms is not None and not with_terms.falls:
+            yield _NO_LOWER
     if hint is not None:
         more = int(np.ceil(len(tracks) * max((3.2 / max(hint.paired_comparison.z, 0.5)) ** 2 - 1, 0.5)))
         yield f"{hint.name} may be missing, but {len(tracks)} trials are too few to decide; about {more} more would decide."
-    for c in selection.steps[0].ranking:
+    for c in selection.steps[0].ranking if not selection.accepted else ():  # what is found explains the others' odd numbers
         if c.rejected_because and c.paired_comparison.elpd_diff > NOTABLE * float(selection.nominal.losses.mean()):
-            yield f"{c.name} was not considered: {c.rejected_because}."
+            yield (
+                f"{c.name} would lower the error, but is no explanation: fitted, {c.rejected_because}. If a measurement of your "
+                "own says that this is so, add the effect all the same (bns add)."
+            )
 
 
 def _on_cancelling(each: Cancelled) -> str:
@@ -181,19 +189,23 @@ def on_many_apart(trials: Sequence[str]) -> str:
     )
 
 
-def _no_lower(with_terms: PairedErrors) -> str:
-    """What to do with a term with which the error does not fall at all horizons."""
-    if not with_terms.rose_in_the_end:
-        return (
-            "Adding it does not clearly improve predictions of held-out trials: it describes the robot, but is not needed in the "
-            "model."
-        )
-    both = with_terms.rose_in_the_end, with_terms.fell_in_the_end
-    rose, fell = (" and ".join(IN_WORDS.get(h, h) for h in names) for names in both)
+_NO_LOWER = (
+    "Adding a term for that does not clearly improve predictions of held-out trials: it describes the robot, but is not needed "
+    "in the model."
+)
+
+
+def _on_rejected(terms: Sequence[str], with_terms: PairedErrors) -> str:
+    """On terms that fit, and with which the error on held-out trials rises."""
+    risen = with_terms.rose_in_the_end
+    fallen = [horizon for horizon in with_terms.fell_in_the_end if horizon not in risen]
+    rose, fell = (" and ".join(IN_WORDS.get(h, h) for h in names) for names in (risen, fallen))
     though = f", though it falls over {fell}" if fell else ""
+    what = "a free term fits best that says" if len(terms) == 1 else "free terms fit best that say"
     return (
-        f"With it, the error on held-out trials rises over {rose}{though}. It may describe something else than what happens "
-        "there, and the extended model does without it."
+        f"Of what no listed effect explains {what}: {'; '.join(terms)}. With {'it' if len(terms) == 1 else 'them'} the error on "
+        f"held-out trials (root mean square or median) rises over {rose}{though}. So something else happens, and the extended "
+        "model does without."
     )
 
 
@@ -262,6 +274,7 @@ def _on_effects(selection: SelectionResult, tracks: Tracks, imitating: Sequence[
     if tracker is not None and tracker.in_words:
         yield tracker.in_words
     yield from (text for effect in chain for other, text in effect.beside.items() if other in names)
+    yield from _on_stamps(tracks, names)
     yield from _on_times(selection, tracks, names)
     per_trial_effect = selection.fit.model.per_trial_effect
     if per_trial_effect is not None:
@@ -287,6 +300,17 @@ def _on_drift(name: str, start_s: Array, own_s: Array) -> Iterator[str]:
         yield (
             f"The values of {name} change by {3600 * rate:+.3g} s per hour of the session (correlation {r:+.2f}): the clocks "
             f"run at rates that differ by {1e6 * abs(rate):.3g} parts in a million."
+        )
+
+
+def _on_stamps(tracks: Tracks, names: Collection[str]) -> Iterator[str]:
+    """On delays that may be the mean of those with which poses are stamped."""
+    late = [name for name in DELAYS if name in names]
+    scatter = stamp_scatter(tracks) if late and tracks.timed else None
+    if scatter is not None:
+        yield (
+            f"The poses' time stamps scatter by {1e3 * scatter.sd_s:.2g} ms (see the irregularities in the data), as if they "
+            f"were given on arrival: {' and '.join(late)} may be the mean of these delays, and not of the robot."
         )
 
 
@@ -327,18 +351,15 @@ def _on_rest(rest: Unexplained, tracks: Tracks) -> Iterator[str]:
             "acknowledge them."
         )
     if rest.autocorrelation is not None:
-        r = rest.autocorrelation
-        after = f"{r.lag} frames later" if r.scale == "within" else "in the next command"
-        yield (
-            f"The unexplained motion in the direction {r.direction} repeats itself {after} (correlation "
-            f"{r.correlation:+.2f}): something oscillates or drifts that no logged variable shows."
-        )
+        yield rest.autocorrelation.in_words
     if rest.outliers:
         worst = "; ".join(o.in_words for o in rest.outliers[:SHOWN])
         more = ", and so on" if len(rest.outliers) > SHOWN else ""
         some = f"{len(rest.outliers)} of {len(tracks)} trials"
         begun = f"{some} have moments with more than {FAR:g} times the usual error ({worst}{more})"
-        if len(rest.outliers) >= OFTEN * len(tracks):
+        if rest.shared is not None:
+            yield f"{begun}. What they share: {rest.shared.in_words}. Look at what the robot does after such commands."
+        elif len(rest.outliers) >= OFTEN * len(tracks):
             yield f"{begun}. That is too often for accidents: look for what they share, such as a place or a change of command."
         else:
             yield (

@@ -121,6 +121,7 @@ class Diagnosis:
             "without_worst": self._without_worst(),
             "outliers": [vars(o) for o in self.rest.outliers],
             "command_times": vars(self.rest.command_times) if self.rest.command_times else None,
+            "outliers_share": {**vars(self.rest.shared), "in_words": self.rest.shared.in_words} if self.rest.shared else None,
             "notes": list(self.notes),
             "calibration": numbers_of(self.calibration) if self.calibration else {},
             "wheel_sizes": {
@@ -131,16 +132,21 @@ class Diagnosis:
 
     @property
     def behaviour(self) -> tuple[str, ...]:
-        """What no effect explains, in clauses: commands at times that scatter, moments that stand out, then the terms."""
-        moments, times = self.rest.outliers, self.rest.command_times
+        """What no effect explains, in clauses: as `moments`, then the terms that do not raise the error."""
+        return *self.moments, *(() if self.terms_raise_the_error else self.terms_in_words)
+
+    @property
+    def moments(self) -> tuple[str, ...]:
+        """In clauses: commands at times that scatter, moments that stand out, and what these share."""
+        moments, times, shared = self.rest.outliers, self.rest.command_times, self.rest.shared
         scattered = (times.in_words,) if times is not None else ()
         if not moments or self.selection is None:
-            return *scattered, *self.terms_in_words
+            return scattered
         trials = len(self.selection.problem.predictor.tracks)
         often = "the error is large at some moments, too often for accidents"
         what = often if len(moments) >= OFTEN * trials else "something happens for a moment"
         worst = f"in {len(moments)} of {trials} trials {what}; the worst is {moments[0].in_words}"
-        return *scattered, worst, *self.terms_in_words
+        return *scattered, worst, *((shared.in_words,) if shared is not None else ())
 
     @property
     def numbers(self) -> dict[str, dict[str, dict[str, Any]]]:
@@ -273,7 +279,9 @@ def _diagnosed(
     left = found.rest.any or bool(found.terms)
     words = tuple(in_words(term, predictor) for term in found.terms)
     formula = _formula_in_words(found.formula, predictor) if not found.terms else ""
-    hint = _hint(found.selection, len(predictor.tracks), {*found.withdrawn, *found.imitating, *found.negligible})
+    judged = {*found.withdrawn, *found.imitating, *found.negligible}
+    # what no effect explains lifts many effects a little
+    hint = None if left else _hint(found.selection, len(predictor.tracks), judged)
     tick("longer explanations")
     pairs = [] if left else _longer(found.selection, listed(found.selection.nominal.model, extra, predictor.tracks, barred))
     notes = notes_on(found, predictor.tracks, hint, pairs, words, [in_words(t, predictor) for t in found.slight], formula)

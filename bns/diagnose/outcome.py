@@ -114,7 +114,11 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
         found = _believable(found, stands, predictor, response)
         lost = tuple(name for name in stands.selection.accepted if name not in found.names)
         unseen = unseen and not _does_better_than_more(found, stands.selection, lost)
-        next_to = _standing(stands.selection.only(found.names), predictor, given, tick) if lost else stands
+        new = tuple(name for name in found.names if name not in stands.selection.accepted)
+        chosen = stands.selection.only(tuple(name for name in found.names if name not in new)) if lost else stands.selection
+        # what only the terms brought to light is judged beside them
+        found_all = _explained(chosen, found.names) if new else chosen
+        next_to = _standing(found_all, predictor, given, tick, withdraw=not new) if lost or new else stands
         errors = _errors_with_terms(next_to.selection, given, found) if found.terms else None
         matters = errors is None or _matters(errors)
         if unseen or (not matters and next_to.rest.any and not _unexplained_beside(found).any):
@@ -163,13 +167,15 @@ def errors_before_and_after(selection: SelectionResult, given: Model) -> PairedE
     return judged_errors(predictor, pose_filter, given, _with_effects(selection))
 
 
-def _standing(selection: SelectionResult, predictor: Predictor, given: Model, tick: Callable[[str], None]) -> Standing:
+def _standing(
+    selection: SelectionResult, predictor: Predictor, given: Model, tick: Callable[[str], None], withdraw: bool = True
+) -> Standing:
     """The effects of a selection with which the held-out error falls: all, or those left when the worst were withdrawn."""
     tick("errors on trials held out")
     selection = refitted(selection, predictor, given)
     errors = errors_before_and_after(selection, given)
     searched = selection.accepted
-    while selection.accepted and not errors.falls:
+    while withdraw and selection.accepted and not errors.falls:
         selection, errors = _without_the_worst(selection, predictor, given)
     withdrawn = tuple(name for name in searched if name not in selection.accepted)
     tick("what is left")
@@ -280,7 +286,9 @@ def _established(
     known = known_effects(selection)
     accepted = {name: known[name] for name in selection.accepted}
     past = rest.command_times is None  # a response in time would describe the mean of delays that differ
-    found = established(predictor, selection.nominal.model, accepted, response, selection.fit.model, past)
+    tried = [c.name for step in selection.steps[:1] for c in step.ranking if c.name not in accepted]
+    others = {name: known[name] for name in tried if name in known}
+    found = established(predictor, selection.nominal.model, accepted, response, selection.fit.model, past, others)
     lost = set(selection.accepted) - set(found.names)
     believed = not found.terms or not any(implausible(selection.fit, name) for name in lost)
     if lost and believed and certainly_lower((found.problem, found.fit), (selection.problem, selection.fit)):

@@ -25,14 +25,14 @@ def planned(plan: Plan, place: Placement) -> str:
     """What a sweep would take, and where it would run."""
     time = "unknown" if math.isnan(plan.seconds_estimate) else in_words(plan.seconds_estimate)
     return (
-        f"{plan.sweep}: {plan.total} runs, {plan.done} done, {plan.remaining} to do; about {time} (h:mm:ss) with "
+        f"{plan.sweep}: {_runs(plan.total)}, {plan.done} done, {plan.remaining} to do; about {time} (h:mm:ss) with "
         f"{place.where}, {plan.bytes_estimate / 2**20:.0f} MiB more on disk (from {plan.basis})"
     )
 
 
 def summed_up(summary: Summary, results: Path) -> str:
     """Where a sweep stands, and how to go on."""
-    text = f"{summary.sweep}: {summary.new} runs now, {summary.done} of {summary.total} done, in {results}"
+    text = f"{summary.sweep}: {_runs(summary.new)} now, {summary.done} of {summary.total} done, in {results}"
     if summary.failed or summary.quarantined:
         text += (
             f"; {summary.failed} failed, {summary.quarantined} quarantined (why: bns query "
@@ -47,6 +47,10 @@ def summed_up(summary: Summary, results: Path) -> str:
     elif summary.stopped_by:
         text += f"; stopped: {_WHY[summary.stopped_by]}; the same command continues from here"
     return text
+
+
+def _runs(number: int) -> str:
+    return f"{number} run{'' if number == 1 else 's'}"
 
 
 def status_table(rows: Sequence[SweepRow]) -> str:

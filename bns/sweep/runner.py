@@ -88,7 +88,7 @@ def run_sweep(
     sweep_run = _SweepRun(sweep, Path(results), budget or Budget(), on_progress, shard)
     if job is run_job and any(names_a_file(str(combo.get("world", ""))) for combo in sweep.combos):
         known = recorded(Path(results), sweep.name)
-        check_world_files(spec for spec in ordered_specs(sweep) if spec.run_id not in known)
+        check_world_files((spec for spec in ordered_specs(sweep) if spec.run_id not in known), sweep.place_of)
     name = shard.name if shard else ""
     with Interrupts(grace_s) as sweep_run.interrupts:
         try:

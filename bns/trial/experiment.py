@@ -18,6 +18,7 @@ from bns.trial.driver import TrialDriver
 from bns.trial.folder import (
     JOURNAL,
     MEASUREMENTS,
+    PICTURE,
     check_not_cut,
     check_not_lost,
     forget_unless,
@@ -28,7 +29,7 @@ from bns.trial.folder import (
     stuck_before,
 )
 from bns.trial.report import count_of
-from bns.trial.session import PICTURE, TrialSetup, open_rig
+from bns.trial.session import TrialSetup, open_rig
 
 _START = ("start_x_m", "start_y_m", "start_heading_rad")
 

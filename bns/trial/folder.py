@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shlex
 import sys
+import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,13 +17,14 @@ from filelock import FileLock, Timeout
 
 from bns.errors import BnsError, HardwareError, StoreError, TrialFileError
 from bns.hardware.link.hardware_log import events
+from bns.hardware.link.sealed_lines import LogWarning
 from bns.measurements import write_measurements
 from bns.spec import RunSpec, parameters_in
 from bns.trial.driver import REPEATED, Stuck
 from bns.trial.evaluation import Evaluation
-from bns.trial.table_lines import moving_away, rows_before_odd
+from bns.trial.table_lines import edits, free_name, moving_away, old_tables, rows_before_odd
 
-JOURNAL, MEASUREMENTS, REPEATS = "journal.jsonl", "measurements.csv", "repeats.csv"
+JOURNAL, MEASUREMENTS, REPEATS, PICTURE = "journal.jsonl", "measurements.csv", "repeats.csv", "last-drive.png"
 
 
 @contextmanager
@@ -88,7 +90,8 @@ def check_not_lost(journal: Path) -> None:
     compared = compare if left[0].name == MEASUREMENTS else ""
     raise HardwareError(
         f"{left[0]} is there, and {journal.name}, from which it was made, is gone: what was measured is in that table alone."
-        f"{compared} Restore the journal from a copy to resume the trial; to start anew, move the folder {journal.parent} away."
+        f"{compared} Restore the journal from a copy to resume the trial; to repeat the trial from the start, move the folder "
+        f"{journal.parent} away."
     )
 
 
@@ -96,9 +99,12 @@ def check_not_cut(journal: Path) -> None:
     """HardwareError if the table of measurements in its folder has more rows than a journal holds, or others.
 
     Numbers and checksums of lines do not show that lines at the end are lost; and a trial that goes on writes over the table.
+    So a LogWarning says where there is no table to compare with, and where cells of it are others than the journal's: such a
+    table is kept as a copy.
     """
     table = journal.with_name(MEASUREMENTS)
     if not table.exists():
+        _warn_without_table(journal, table)
         return
     try:
         lines = table.read_bytes().split(b"\n")[:-1]
@@ -121,6 +127,43 @@ def check_not_cut(journal: Path) -> None:
             f"line {good + 2} of {table} is no row of measurements of this trial (its journal holds {held} rows, the table "
             f"{kept}). The table is made from the journal; move it away and resume, and it is made again: {moving_away(table)}"
         )
+    if kept and (edited := edits(lines, rows.to_csv(index=False).encode().splitlines())):
+        _warn(
+            f"{table} differs from {journal.name}, from which it is made, in {edited}. The journal decides, and the table is "
+            f"made again; as it was it is kept as {_copied(table)}."
+        )
+
+
+def _warn_without_table(journal: Path, table: Path) -> None:
+    """LogWarning, if anything was driven, that no table shows whether the journal is whole."""
+    rows, older = measured(journal), old_tables(table)
+    if not (len(rows) or older or journal.with_name(PICTURE).exists()):
+        return
+    holds = f"{len(rows)} rows of measurements, up to trial {rows['trial'].max()}" if len(rows) else "no measurements"
+    beside = "".join(f"; {path.name} beside it has {_rows_in(path)} rows" for path in older)
+    _warn(
+        f"{table} is not there, so nothing shows whether {journal.name} has lost lines at its end. It decides, and the trial "
+        f"goes on after what it holds: {holds}{beside}."
+    )
+
+
+def _rows_in(table: Path) -> int:
+    return max(0, table.read_bytes().count(b"\n") - 1)
+
+
+def _copied(table: Path) -> Path:
+    """A copy of a table beside it, written once."""
+    data = table.read_bytes()
+    same = [path for path in old_tables(table) if path.read_bytes() == data]
+    copy = same[0] if same else free_name(table)
+    if not same:
+        with robot_stands(copy):
+            copy.write_bytes(data)
+    return copy
+
+
+def _warn(text: str) -> None:
+    warnings.warn(text, LogWarning, stacklevel=4)
 
 
 def spec_of(journal: Path) -> RunSpec:

@@ -35,6 +35,7 @@ from bns.trial.background import BackgroundDriver
 from bns.trial.driver import TrialDriver
 from bns.trial.evaluation import Evaluation
 from bns.trial.folder import (
+    PICTURE,
     REPEATS,
     TrialFolder,
     forget_unless,
@@ -48,7 +49,7 @@ from bns.trial.operator import EmulatedHands, Operator, TerminalOperator, Unatte
 from bns.trial.report import TrialResult, report
 from bns.worlds.robot import RobotWorld
 
-GUARD_LOG, PICTURE = "guard.jsonl", "last-drive.png"
+GUARD_LOG = "guard.jsonl"
 SWEEP, SWEEP_EMULATED = "trials", "trials-emulated"
 MOST_ROUNDS = 50
 

@@ -1,5 +1,7 @@
 """Approaches two by two, against SciPy and by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -162,6 +164,17 @@ def test_only_combinations_and_seeds_that_every_approach_has_are_pooled(tmp_path
         (drawn,) = module.draw(Results(tmp_path))
         assert drawn.n == 24
         assert "(10 %, 30 %)" in drawn.shows
+
+
+@pytest.mark.parametrize("archived", [False, True])
+def test_a_run_that_differs_in_what_it_records_alone_counts_once(tmp_path, archived):
+    made = runs_at_rates(range(6), begins={("bns", 0.1): 1, ("bns", 0.3): 1})
+    again = [with_evals(replace(run.spec, record="paths"), **run.tables["evals"]) for run in made if run.spec.approach == "bns"]
+    written(tmp_path / "results", "mixed", [*made, *again])
+    place = archive(tmp_path / "results", tmp_path / "mixed.parquet").path if archived else tmp_path / "results"
+    for module in ALL_FIGURES:
+        (drawn,) = module.draw(Results(place, archived=archived))
+        assert drawn.n == 24
 
 
 def test_approaches_that_share_no_other_parameter_are_not_compared_and_the_parameter_is_named(tmp_path):

@@ -1,6 +1,7 @@
 """Commands that take effect now sooner, now later: the scatter is measured, said, and not described as a response in time."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -39,6 +40,16 @@ def stopping_sooner(tracks):
     return replace(tracks, duration_s=duration_s)
 
 
+def late_where_large(tracks, beyond_m_s, late_s):
+    """The tracks of a robot that carries out a change of command late where both wheels together change by more."""
+    duration_s = tracks.duration_s.copy()
+    by = np.abs(np.diff(tracks.left_m_s, axis=1)) + np.abs(np.diff(tracks.right_m_s, axis=1))
+    for trial, k in np.argwhere(by > beyond_m_s):
+        if duration_s[trial, k] > 2 * late_s:
+            duration_s[trial, k : k + 2] += -late_s, late_s
+    return replace(tracks, duration_s=duration_s)
+
+
 def times_in(table, model=NOMINAL, as_logged=lambda tracks: tracks):
     predictor = WheelPredictor(as_logged(tracks_of(table)))
     problem = problem_for(predictor, model)
@@ -64,6 +75,15 @@ def test_stops_of_a_robot_with_friction_are_no_scatter(monkeypatch):
     table = measured(NOMINAL, trials=30, seed=3, speeds=(0.02, 0.2), commands=8, pauses=True, straight=1.0)
     assert times_in(table, as_logged=stopping_sooner) is None
     assert times_in(late(table), hidden(command_delay={"delay_s": LATEST * FRAME_S / 2})) is not None
+
+
+@pytest.mark.parametrize(("beyond_m_s", "late_s"), [(0.4, 0.12), (0.35, 0.2)])
+def test_large_changes_that_are_late_are_no_scatter(monkeypatch, table, beyond_m_s, late_s):
+    """Without a look at the sizes of the changes, they would be."""
+    robot = partial(late_where_large, beyond_m_s=beyond_m_s, late_s=late_s)
+    assert times_in(table, as_logged=robot) is None
+    monkeypatch.setattr("bns.diagnose.residuals.command_times.ALIKE", -np.inf)
+    assert times_in(table, as_logged=robot) is not None
 
 
 @pytest.mark.parametrize(

@@ -121,6 +121,17 @@ def test_a_formula_is_added_and_comes_back(data, tmp_path):
     assert model.values_of("mine")["k"] == pytest.approx(-0.12, abs=0.03)
 
 
+def test_listed_effects_and_a_formula_are_added_together(data, tmp_path, capsys):
+    new, told = tmp_path / "both.yaml", ["--term", "k * v * abs(w)", "--model", "khepera", "--data", str(data)]
+    assert main(["add", "speed-gain", "mine", *told, "-o", str(new)]) == 0
+    written = {active.effect.name: active.written for active in load_model(new).effects}
+    assert written == {"speed-gain": {}, "mine": {"term": "k * v * abs(w)", "on": "v"}}
+    capsys.readouterr()
+    for names in (["speed-gain", "motor-lag"], ["mine", "yours"]):
+        assert main(["add", *names, *told, "-o", str(new)]) == 2
+        assert f"one name of its own, beside any names of listed effects; given are {', '.join(names)}" in capsys.readouterr().err
+
+
 @pytest.mark.slow
 def test_an_effect_of_ones_own_is_a_file(data, tmp_path, capsys):
     mine = tmp_path / "drag.py"

@@ -46,15 +46,36 @@ def test_effects_come_before_what_is_not_explained(monkeypatch):
     found = found_with(monkeypatch, predictor, "yaw-bias")
     assert headline(found).startswith("Missing from the model: ")
     said = headline(replace(found, verdict="unlisted"))
-    assert said == headline(found)[:-1] + ", and something that none of the known effects explains."
+    assert said == headline(found)[:-1] + "; and something that none of the known effects explains."
     tied = replace(found.selection, competing_models=(("wheel-mismatch",),))
     either = headline(replace(found, verdict="unlisted", selection=tied))
     cause, other = (effect_named(name).in_words for name in ("yaw-bias", "wheel-mismatch"))
-    assert either.startswith(f"Missing from the model: either {cause}, or {other}; and also something that none")
+    assert either == (
+        f"Missing from the model: either {cause}; or {other}. These measurements cannot decide which. "
+        "And something that none of the known effects explains is missing as well."
+    )
     shared = replace(found.selection, accepted=("yaw-bias", "motor-lag"), competing_models=(("wheel-mismatch", "motor-lag"),))
     once = headline(replace(found, verdict="tie", selection=shared))
     lag = effect_named("motor-lag").in_words
-    assert once.startswith(f"Missing from the model: {lag}; and either {cause}, or {other}. These")
+    undecided = "These measurements cannot decide which."
+    assert once == f"Missing from the model: {lag}. Also missing: either {cause}; or {other}. {undecided}"
+    wider = effect_named("wheelbase").in_words
+    both = replace(shared, accepted=("yaw-bias", "motor-lag", "wheelbase"), competing_models=(("wheel-mismatch", "motor-lag"),))
+    assert headline(replace(found, verdict="tie", selection=both)) == (
+        f"Missing from the model: {lag}. Also missing: either {cause}, and at the same time {wider}; or {other}. {undecided}"
+    )
+    bare = replace(shared, accepted=("motor-lag",), competing_models=(("motor-lag", "yaw-bias"),))
+    assert headline(replace(found, verdict="tie", selection=bare)) == (
+        f"Missing from the model: {lag}. Perhaps also missing: {cause}. These measurements cannot decide."
+    )
+    three = replace(bare, competing_models=(("motor-lag", "yaw-bias"), ("motor-lag", "wheel-mismatch")))
+    assert headline(replace(found, verdict="tie", selection=three)) == (
+        f"Missing from the model: {lag}. Perhaps also missing: {cause}; or {other}. {undecided}"
+    )
+    of_two = replace(both, competing_models=(("motor-lag", "wheelbase", "wheel-mismatch"),))
+    assert headline(replace(found, verdict="tie", selection=of_two)) == (
+        f"Missing from the model: {lag}; and {wider}. Also missing: either {cause}; or {other}. {undecided}"
+    )
     assert with_what(replace(found, verdict="tie")) == "With the first of these explanations"
     assert with_what(found) == "With it"
     bare = headline(replace(found, verdict="unlisted", selection=replace(found.selection, accepted=())))
@@ -67,13 +88,16 @@ def test_the_head_of_a_page_lists_three_effects_and_says_two_in_one_sentence(mon
     lag, mismatch = (effect_named(name).in_words for name in ("motor-lag", "wheel-mismatch"))
     two, three = (replace(found.selection, accepted=names) for names in (("motor-lag", "wheel-mismatch"), NAMES))
     of_two, of_three = (replace(found, selection=one, verdict="effects") for one in (two, three))
-    assert head_of_page(of_two) == (f"Missing from the model: {lag} and {mismatch}.", [])
+    assert head_of_page(of_two) == (f"Missing from the model: {lag}; and {mismatch}.", [])
+    assert headline(replace(of_two, verdict="unlisted")) == (
+        f"Missing from the model: {lag}; {mismatch}; and something that none of the known effects explains."
+    )
     title, listed = head_of_page(of_three)
     assert title == "Missing from the model: 3 effects."
     assert listed[:2] == [lag, mismatch]
     assert headline(of_three) == f"Missing from the model: {lag}; {mismatch}; and {listed[2]}."
     title, _ = head_of_page(replace(of_three, verdict="unlisted"))
-    assert title == "Missing from the model: 3 effects, and something that none of the known effects explains."
+    assert title == "Missing from the model: 3 effects and something that none of the known effects explains."
     tied = replace(of_three, selection=replace(three, competing_models=(("motor-lag",),)), verdict="unlisted")
     assert head_of_page(tied) == (headline(tied), [])
 

@@ -334,7 +334,8 @@ def test_units_of_a_robot_that_is_told_how_fast_to_go_forward(table, size, facto
         (0.9, 0.0, {"lasting_s": 20.0}),
         (0.0, 0.0, {"lasting_s": 20.0}),
         (0.5, 3.0, {"gap_s": 2.0}),
-        (1.5, 3.0, {"standing_s": 1.0}),
+        (1.5, 3.0, {"gap_s": 2.0}),
+        (1.5, 1.0, {"standing_s": 1.0}),
     ],
 )
 def test_a_log_without_trials_is_cut_at_what_it_has(stands_s, gap_s, cut):
@@ -346,6 +347,55 @@ def test_a_log_without_trials_is_cut_at_what_it_has(stands_s, gap_s, cut):
     log = pd.DataFrame({"time": t, "v": v, "omega": 0.1 * (v > 0), "x": 0.1 * t, "y": 0.0, "yaw": 0.0})
     assert guessed(log).mapping["trials"] == cut
     assert guessed(log.drop(columns=["v", "omega"])).mapping["trials"] == {"standing_s": 1.0}
+
+
+def drives_and_gaps(gaps_s, lost_s=0.0, stands=0):
+    """Poses at 25 Hz and commands at 2 Hz in two tables: drives of 13 s, with ``stands`` of 1.5 s each, then 2 s of standing, and
+    gaps in which nothing is written; in the middle of the first drive nothing is written for ``lost_s`` either."""
+    poses, times, speeds, begin = [], [], [], 0.0
+    for gap_s in (*gaps_s, 0.0):
+        own, tick = 0.04 * np.arange(375), 0.5 * np.arange(30)
+        still = (tick >= 13.0) | ((tick < 3.0 * stands) & (tick % 3.0 >= 1.0) & (tick % 3.0 < 2.5))
+        lost = [(part > 7.0) & (part < 7.0 + lost_s) & (begin == 0.0) for part in (own, tick)]
+        poses.append(begin + own[~lost[0]])
+        times.append(begin + tick[~lost[1]])
+        speeds.append(np.where(still, 0.0, 0.2)[~lost[1]])
+        begin += own[-1] + gap_s
+    t, told = np.concatenate(poses), np.concatenate(speeds)
+    seen = pd.DataFrame({"t_s": t, "x": 0.1 * t, "y": 0.0, "yaw": 0.0})
+    return seen, pd.DataFrame({"t_s": np.concatenate(times), "left_m_s": told, "right_m_s": told})
+
+
+def test_commands_that_are_seconds_apart_hide_no_gap_between_poses():
+    seen, told = drives_and_gaps([5.0, 15.0, 8.0])
+    rare = told[told.index % 6 == 0].assign(left_m_s=0.2)  # every 3 s; by themselves they have no clear gap
+    rare.loc[rare.index % 30 == 24, ["left_m_s", "right_m_s"]] = 0.0  # and end with a stop
+    assert rare.t_s.diff().nlargest(3).iloc[-1] < 3 * rare.t_s.diff().nlargest(4).iloc[-1]
+    assert guessed(seen, {"commands.csv": rare}, "poses.csv").mapping["trials"] == {"gap_s": 2.0}
+
+
+@pytest.mark.parametrize(
+    ("gaps_s", "lost_s", "stands", "cut"),
+    [
+        ([5.0, 15.0, 8.0], 0.0, 0, {"gap_s": 2.0}),  # though it stands before each gap
+        ([5.0, 15.0, 8.0], 0.0, 2, {"gap_s": 2.0}),
+        ([5.0, 15.0, 60.0], 0.0, 0, {"gap_s": 2.0}),
+        ([0.04] * 7, 6.0, 0, {"standing_s": 1.0}),  # the tracker failed once in eight drives
+    ],
+)
+def test_a_log_with_clear_gaps_in_time_is_cut_there_though_the_robot_stands_before_them(gaps_s, lost_s, stands, cut):
+    seen, told = drives_and_gaps(gaps_s, lost_s, stands)
+    found = guessed(seen, {"commands.csv": told}, "poses.csv").mapping["trials"]
+    assert found == cut
+
+
+def test_where_rows_are_seconds_apart_the_gap_that_is_proposed_is_longer():
+    """A row every 2.5 s, at the ends of commands; 10 s between trials: neither all rows are trials nor is none."""
+    t = np.cumsum(np.tile([10.0, *[2.5] * 8], 6))
+    log = pd.DataFrame({"time": t, "v": np.tile([0.1] * 8 + [0.0], 6), "omega": 0.0, "x": 0.1 * t, "y": 0.0, "yaw": 0.0})
+    assert guessed(log).mapping["trials"] == {"gap_s": 5.0}
+    gone = log.iloc[np.delete(np.arange(len(log)), [13])]  # twice as long once is no clear gap, but the 10 s stay what is clear
+    assert guessed(gone).mapping["trials"] == {"standing_s": 1.0}
 
 
 @pytest.mark.parametrize("unit", [1.0, 180 / np.pi], ids=["rad", "deg"])

@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -12,9 +11,9 @@ import yaml
 from bns.cli.main import main
 from bns.diagnose.data.checks import checked
 from bns.diagnose.data.tracker_faults import jumps, without_faults
-from bns.diagnose.data.tracking_noise import SETTLED_S, TrackingNoise, _about, _at_rest, tracking_noise
+from bns.diagnose.data.tracking_noise import TrackingNoise, _about, tracking_noise
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.predict.paired_errors import FEWEST_TRIALS, Change, paired_errors
+from bns.diagnose.predict.paired_errors import FEWEST_TRIALS, Change, _Draws, paired_errors
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.measurements import write_measurements
 from bns.physics.model import Model
@@ -207,12 +206,29 @@ def test_deviations_from_a_rest_are_as_large_as_the_noise_however_few_poses_it_h
     assert np.std(np.concatenate(off)) == pytest.approx(0.002, rel=0.03)
 
 
-def test_a_rest_begins_when_the_robot_has_settled():
-    t_s = np.arange(0.0, 4.0, 0.1)
-    tracks = SimpleNamespace(
-        first=np.array([0, 40]), t_s=t_s, pose=np.zeros((40, 3)), duration_s=np.array([[1.0, 2.0, 1.0]]),
-        left_m_s=np.array([[0.1, 0.0, 0.1]]), right_m_s=np.array([[0.1, 0.0, 0.0]]),
-    )  # fmt: skip
-    ((seen, _),) = _at_rest(tracks)
-    assert seen[0] == pytest.approx(1.0 + SETTLED_S, abs=0.1)
-    assert seen[-1] == pytest.approx(3.0, abs=0.1)
+def test_a_model_that_lowers_rare_large_errors_and_raises_all_others_does_not_lower_the_error():
+    """The model as given is right but for the third command of a trial; the other one is better there, and 3 % low elsewhere."""
+    table = measured(NOMINAL, trials=16, seed=4, commands=12, noise=(2e-4, 1e-3))
+    predictor = WheelPredictor(tracks(table))
+    changed = table.groupby("trial")["left_m_s"].diff().fillna(0.0) != 0
+    rare = (changed.groupby(table["trial"]).cumsum() == 3).to_numpy()[:, None]
+    right = predictor.steps(NOMINAL)
+    given, other = (replace(right, body=right.body * np.where(rare, *factors)) for factors in ((1.5, 1.0), (1.4, 0.97)))
+    judged = paired_errors(predictor, [("given", given), ("other", other)])
+    change = judged.horizons["command"].changes[0]
+    assert change.change_m < 0
+    assert change.median_rose
+    assert not judged.falls
+    assert "command" in judged.rose_in_the_end
+    better = paired_errors(predictor, [("given", given), ("right", right)])
+    assert better.falls
+    assert not any(at.changes[0].median_rose for at in better.horizons.values())
+
+
+def test_medians_of_samples_are_those_of_all_their_windows():
+    rng = np.random.default_rng(0)
+    of_trial = np.repeat(np.arange(12), rng.integers(3, 9, 12))
+    values = rng.exponential(size=len(of_trial))
+    draws = _Draws.over(np.bincount(of_trial))
+    expected = [np.quantile(np.repeat(values, n[of_trial].astype(int)), 0.5, method="inverted_cdf") for n in draws.drawn[:50]]
+    assert draws.medians(values, of_trial)[:50] == pytest.approx(expected)

@@ -15,6 +15,7 @@ from bns.diagnose import values
 from bns.diagnose.comparison import compare
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import Diagnosis
+from bns.diagnose.predict.paired_errors import Change
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report import tables
 from bns.diagnose.report.plain_language import _rounded_up, figures_in_words
@@ -222,9 +223,20 @@ def test_an_effect_that_was_found_and_is_not_in_the_ranking_is_named_beside_it()
     """As where a screening came before it, of a body on joints."""
     first = SimpleNamespace(ranking=[], decoy_threshold=0.1)
     lines = list(_ranking(SimpleNamespace(selection=SimpleNamespace(steps=[first]), effects=("servo-delay",))))
-    assert "  (not fitted alone in this round, though found: servo-delay)" in lines
+    assert "  (not tried alone, but found later in the search: servo-delay)" in lines
     lines = list(_ranking(SimpleNamespace(selection=SimpleNamespace(steps=[first]), effects=())))
-    assert not any("not fitted alone" in line for line in lines)
+    assert not any("not tried alone, but" in line for line in lines)
+
+
+def test_why_effects_are_not_considered_is_explained_below_their_list():
+    gain = SimpleNamespace(elpd_diff=1.0, dse=0.1, p_value=0.01)
+    reasons = ("k is at its bound, 5 s", "")
+    one, other = (SimpleNamespace(name="x", rejected_because=why, paired_comparison=gain) for why in reasons)
+    said = "  (not considered: alone, it fits only with a number that no robot has"
+    for ranking, explained in (([one, other], True), ([other], False)):
+        first = SimpleNamespace(ranking=ranking, decoy_threshold=0.1)
+        lines = list(_ranking(SimpleNamespace(selection=SimpleNamespace(steps=[first]), effects=("x",))))
+        assert any(line.startswith(said) for line in lines) == explained
 
 
 def test_a_bound_that_is_rounded_stays_a_bound():
@@ -246,11 +258,32 @@ def test_the_table_of_errors_has_every_model_of_the_answer(effects, terms, colum
     at = SimpleNamespace(horizon="1s", windows=7, models=models, total=None, noise_floor_m=0.002)
     errors = SimpleNamespace(horizons={"1s": at})
     d = SimpleNamespace(effects=effects, errors=None if terms else errors, errors_with_terms=errors if terms else None)
+    d.terms_raise_the_error = False
     table = error_table(d, None)
     assert table["columns"][1 : 1 + len(columns)] == columns
     said = [cell.partition(" ")[0] for cell in table["rows"][0][1 : 1 + len(columns)]]
     assert said == [f"{1e3 * m.rms_m:.1f}" for m in models]
     assert ("change, 95 % (mm)" in table["columns"]) == (len(columns) > 1)
+
+
+@pytest.mark.parametrize("effects", [(), ("one",)])
+def test_the_change_of_the_error_leads_to_the_last_model_that_is_accepted(effects):
+    """Terms that raise the error are shown, and are no part of the model whose gain is told."""
+    models = [SimpleNamespace(rms_m=n / 1000, median_m=n / 2000) for n in (30, 20, 25)[: 2 + len(effects)]]
+    fell, rose = Change(-0.01, -0.012, -0.008), Change(0.005, 0.004, 0.006)
+    changes, total = ((fell, rose), Change(-0.005, -0.007, -0.003)) if effects else ((rose,), rose)
+    at = {"horizon": "1s", "windows": 7, "models": models, "changes": changes, "total": total, "noise_floor_m": 0.002}
+    errors = SimpleNamespace(horizons={"1s": SimpleNamespace(**at)})
+    d = SimpleNamespace(effects=effects, errors=None, errors_with_terms=errors, terms_raise_the_error=True)
+    table = error_table(d, None)
+    assert "with a term that was rejected (mm)" in table["columns"]
+    shown = dict(zip(table["columns"], table["rows"][0], strict=True))
+    assert shown.get("change, 95 % (mm)") == ("-12.00 to -8.00" if effects else None)
+    d.terms_raise_the_error = False
+    table = error_table(d, None)
+    assert dict(zip(table["columns"], table["rows"][0], strict=True))["change, 95 % (mm)"] == (
+        "-7.00 to -3.00" if effects else "+4.00 to +6.00"
+    )
 
 
 def test_the_parameters_of_a_term_come_in_their_order_and_with_intervals(monkeypatch):

@@ -1,5 +1,7 @@
 """What is left is seen: moments that stand out, what follows an event, what brakes the robot whichever way it goes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -10,7 +12,7 @@ from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.significance import PairedComparison
 from bns.diagnose.predict.wheels import RECENT_S, WheelPredictor
 from bns.diagnose.residuals.along_variables import SHARE, ResidualDependence, probe_effect, significant_dependence
-from bns.diagnose.residuals.autocorrelation import Autocorrelation, _moves
+from bns.diagnose.residuals.autocorrelation import Autocorrelation, _moves, _period
 from bns.diagnose.residuals.outliers import FAR, TRIALS, WIDTH, _windows, outliers
 from bns.diagnose.residuals.unexplained import unexplained
 from tests.diagnose.worlds import FRAME_S, NOMINAL, measured
@@ -131,6 +133,52 @@ def test_a_heading_that_swings_with_a_period_has_a_rhythm(period_s):
     phase = 2 * np.pi * (table.t_s + 0.37 * table.trial) / period_s
     autocorrelation = largest(table.assign(heading_rad=table.heading_rad + 0.02 * np.sin(phase)))
     assert (autocorrelation.direction, autocorrelation.scale) == ("heading", "within")
+    if period_s < 1.0:  # most commands are over before the longer one is
+        assert autocorrelation.period_s == pytest.approx(period_s, rel=0.05)
+        assert "in heading swings to and fro with a period of about 0.4 s, 2.5 Hz" in autocorrelation.in_words
+
+
+def correlogram(r, z=100.0):
+    return [Autocorrelation("", "", lag, float(value), float(z * value)) for lag, value in enumerate(r, start=1)]
+
+
+@pytest.mark.parametrize("period", [6.0, 10.3, 17.0, 30.0])
+@pytest.mark.parametrize("damping", [0.0, 0.03])
+def test_the_period_is_read_off_the_correlations_at_all_lags(period, damping):
+    lag = np.arange(1, 51)
+    wobble = 0.02 * np.random.default_rng(3).standard_normal(50)  # later troughs may be the deepest
+    r = 0.8 * np.exp(-damping * lag) * np.cos(2 * np.pi * lag / period) + wobble
+    assert _period(correlogram(r)) == pytest.approx(period, rel=0.08)
+
+
+@pytest.mark.parametrize(
+    "r",
+    [
+        0.9 ** np.arange(1, 51),  # drifts
+        np.where(np.arange(1, 51) == 4, -0.4, 0.0),  # swings back, and that is all
+        np.cos(2 * np.pi * np.arange(1, 51) / 90),  # swings more slowly than can be seen
+    ],
+)
+def test_what_is_not_alike_again_has_no_period(r):
+    assert _period(correlogram(r)) is None
+    swing = np.cos(np.arange(1, 51))
+    assert _period(correlogram(swing)) == pytest.approx(2 * np.pi, rel=0.05)
+    assert _period(correlogram(swing, z=1.0)) is None
+    assert _period([replace(one, z=min(one.z, 1.0)) for one in correlogram(swing)]) is None  # alike again only by chance
+
+
+def test_a_motion_that_is_opposed_later_is_said_to_swing_back():
+    def said(scale, correlation, period_s=None):
+        return Autocorrelation("left", scale, 5, correlation, -30.0, period_s).in_words
+
+    assert said("within", -0.45) == (
+        "The unexplained motion sideways is opposite 5 frames later (correlation -0.45): something swings back that "
+        "no logged variable shows."
+    )
+    assert said("between", 0.3).startswith("The unexplained motion sideways is alike in the next command (correlation +0.30")
+    swings = "The unexplained motion sideways swings to and fro with a period of about 0.41 s, 2.5 Hz"
+    assert said("within", -0.45, 0.408).startswith(swings)
+    assert not any("repeats" in said(scale, -0.4) for scale in ("within", "between"))
 
 
 @pytest.mark.parametrize("memory", [0.5, 0.6, 0.9])

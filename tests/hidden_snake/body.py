@@ -37,6 +37,14 @@ class Hidden:
     gradient: float = 0.0
     load_kg: dict[int, float] = field(default_factory=dict)
     """On single links, at their middles."""
+    friction_n_m: float = 0.0
+    """Dry friction in every joint, beyond what it has."""
+    friction_of_n_m: dict[int, float] = field(default_factory=dict)
+    """The same in single joints."""
+    gain: dict[int, float] = field(default_factory=dict)
+    """Of single servos, which have all of their torque."""
+    carried_kg: dict[str, float] = field(default_factory=dict)
+    """At the markers."""
     sag: float = 0.0
     marker_m: dict[str, tuple[float, float]] = field(default_factory=dict)
     scale: float = 0.0
@@ -67,11 +75,15 @@ def _xml(h: Hidden) -> str:
             if int(along / pitch_m) == n:
                 off = h.marker_m.get(name, (0.0, 0.0))
                 marks += f'<site name="{name}" pos="{along - n * pitch_m + off[0]} {off[1]} {RADIUS_M}"/>'
+                if name in h.carried_kg:
+                    marks += f'<body pos="{along - n * pitch_m} 0 {RADIUS_M}"><inertial pos="0 0 0" mass="{h.carried_kg[name]}"'
+                    marks += ' diaginertia="1e-8 1e-8 1e-8"/></body>'
         axis = "0 0 1" if n % 2 else "0 1 0"
+        friction = GEAR_LOSS + h.friction_n_m + h.friction_of_n_m.get(n - 1, 0.0)
         joint = (
             "<freejoint/>"
             if n == 0
-            else f'<joint name="j{n - 1}" axis="{axis}" damping="{DAMPING}" armature="{ARMATURE}" frictionloss="{GEAR_LOSS}"/>'
+            else f'<joint name="j{n - 1}" axis="{axis}" damping="{DAMPING}" armature="{ARMATURE}" frictionloss="{friction}"/>'
         )
         place = "0 0 0" if n == 0 else f"{pitch_m} 0 0"
         inner = (
@@ -92,11 +104,13 @@ class Snake:
         self.hidden, self._rng = hidden, rng
         self.model = mujoco.MjModel.from_xml_string(_xml(hidden))
         self.data = mujoco.MjData(self.model)
-        self._strength, self._zero = np.ones(LINKS - 1), np.zeros(LINKS - 1)
+        self._strength, self._zero, self._gain = np.ones(LINKS - 1), np.zeros(LINKS - 1), np.ones(LINKS - 1)
         for joint, value in hidden.strength.items():
             self._strength[joint] = value
         for joint, value in hidden.zero_rad.items():
             self._zero[joint] = value
+        for joint, value in hidden.gain.items():
+            self._gain[joint] = value
         self._balls = [i for i in range(self.model.ngeom) if self.model.geom(i).name.startswith("ball")]
         self._link = np.array([int(self.model.geom(i).name[4:-1]) for i in self._balls])
 
@@ -167,7 +181,7 @@ class Snake:
         error[np.abs(error) < BAND_RAD + h.band_rad] = 0
         tired = 1 - h.tired_per_cycle * self._cycles
         limit = LIMIT * h.torque * self._strength
-        torque = np.clip(STIFFNESS * h.stiffness * tired * self._strength * error, -limit, limit)
+        torque = np.clip(STIFFNESS * h.stiffness * tired * self._strength * self._gain * error, -limit, limit)
         if h.sag:
             torque *= 1 - h.sag * np.mean(np.abs(torque) / np.maximum(limit, 1e-9))
         d.ctrl[:] = torque

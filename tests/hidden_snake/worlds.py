@@ -70,6 +70,10 @@ def worlds() -> list[World]:
         single("weak-joint-9", Hidden(strength={9: 0.45}), "weak-joint-joint9"),
         single("weak-joint-1", Hidden(strength={1: 0.4}), "weak-joint-joint1"),
         single("load", Hidden(load_kg={8: 0.12}), "link-mass-link8"),
+        single("dry", Hidden(friction_n_m=0.15), "dry-friction"),
+        single("tight-7", Hidden(friction_of_n_m={7: 0.5}), "joint-friction-joint7"),
+        single("soft-4", Hidden(gain={4: 0.4}), "soft-joint-joint4"),
+        single("carries", Hidden(carried_kg={"green": 0.15}), "payload-green", "link-mass-link10"),
         World("scale-and-weak", "two", Hidden(scale=0.03, strength={6: 0.5}), ("camera-scale", "weak-joint-joint6")),
     ]
 

@@ -27,13 +27,40 @@ def xml(stiffness: float = 6.0) -> str:
     return XML.format(links=inner, servos=servos)
 
 
-def log(trials: int, seed: int = 0, zero_rad: float = 0.0, strength: float = 1.0, noise_m: float = 0.001) -> pd.DataFrame:
-    """Random set points every 0.48 s, seen at 25 Hz; the elbow's zero may be off, its servo weak."""
+def loaded(text: str, site: str, load_kg: float) -> str:
+    """The file with a body of its own at a site that stands at ``pos="x y z"`` of its link."""
+    spec = mujoco.MjSpec.from_string(text)
+    at = next(one for one in spec.sites if one.name == site)
+    load = at.parent.add_body(pos=at.pos)
+    load.mass, load.ipos, load.iquat, load.inertia, load.explicitinertial = load_kg, [0, 0, 0], [1, 0, 0, 0], [1e-9] * 3, True
+    spec.compile()
+    return str(spec.to_xml())
+
+
+def log(
+    trials: int,
+    seed: int = 0,
+    zero_rad: float = 0.0,
+    strength: float = 1.0,
+    noise_m: float = 0.001,
+    gain: float = 1.0,
+    friction_n_m: tuple[float, ...] = (0.0, 0.0, 0.0),
+    carried_kg: float = 0.0,
+    finer: int = 1,
+) -> pd.DataFrame:
+    """Random set points every 0.48 s, seen at 25 Hz; the elbow's zero may be off, its servo weak or of a lower gain.
+
+    ``friction_n_m``: dry friction in each joint. ``carried_kg``: at the hand. ``finer``: with steps so many times shorter than
+    the model's, and another integrator.
+    """
     rng, rows = np.random.default_rng(seed), []
-    model = mujoco.MjModel.from_xml_string(xml())
-    model.actuator_gainprm[1, 0] *= strength
-    model.actuator_biasprm[1, 1] *= strength
+    model = mujoco.MjModel.from_xml_string(loaded(xml(), "hand", carried_kg) if carried_kg else xml())
+    model.actuator_gainprm[1, 0] *= strength * gain
+    model.actuator_biasprm[1, 1] *= strength * gain
     model.actuator_forcerange[1] *= strength
+    model.dof_frictionloss[:] = friction_n_m
+    if finer > 1:
+        model.opt.timestep, model.opt.integrator = 0.004 / finer, mujoco.mjtIntegrator.mjINT_EULER
     for trial in range(trials):
         data, goal = mujoco.MjData(model), np.zeros(3)
         for step in range(1500):
@@ -44,6 +71,6 @@ def log(trials: int, seed: int = 0, zero_rad: float = 0.0, strength: float = 1.0
                 seen = np.concatenate([data.site(name).xpos[:2] for name in ("elbow", "hand")])
                 rows.append((trial, step * 0.004, *goal, *(seen + noise_m * rng.normal(size=4))))
             data.ctrl[:] = goal + np.array([0, zero_rad, 0])
-            mujoco.mj_step(model, data)
+            mujoco.mj_step(model, data, finer)
     columns = [*(f"{j}_set_rad" for j in JOINTS), *(f"{s}_{a}_m" for s in ("elbow", "hand") for a in "xy")]
     return pd.DataFrame(rows, columns=["trial", "t_s", *columns])

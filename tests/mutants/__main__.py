@@ -1,7 +1,7 @@
 """Small faults planted one at a time: do the nearest tests fail? `python -m tests.mutants --minutes 20`.
 
 cosmic-ray plants them (a comparison, an operator, a number, a truth value exchanged) in a copy of the repository. A sample,
-the same every time for a seed, is drawn room by room in turn until the time is up. Faults that change nothing that is carried
+the same every time for a seed, is drawn group by group in turn until the time is up. Faults that change nothing that is carried
 out (in annotations) are passed over.
 """
 
@@ -28,8 +28,8 @@ from cosmic_ray.ast import ast_nodes, get_ast
 from cosmic_ray.mutating import mutate_code
 from cosmic_ray.plugins import get_operator, operator_names
 
+from tests.mutants.groups import GROUPS
 from tests.mutants.report import written
-from tests.mutants.rooms import ROOMS
 
 HERE = Path(__file__).resolve().parents[2]
 KINDS = (
@@ -54,10 +54,10 @@ def operators() -> list[str]:
     return sorted(name for name in operator_names() if any(kind in name for kind in KINDS))
 
 
-def mutants(room: str, rng: random.Random) -> list[Mutant]:
-    """All of a room, in an order that the seed decides."""
+def mutants(group: str, rng: random.Random) -> list[Mutant]:
+    """All of a group, in an order that the seed decides."""
     found = []
-    for pattern in ROOMS[room][0].split():
+    for pattern in GROUPS[group][0].split():
         for path in sorted(HERE.glob(pattern)):
             nodes = list(ast_nodes(get_ast(path.read_text())))
             for kind in operators():
@@ -80,7 +80,7 @@ def meaning(text: str) -> str:
 
 
 def passes(copy: Path, tests: str, limit_s: float) -> bool:
-    """Whether a room's tests pass in the copy; no after `limit_s`."""
+    """Whether a group's tests pass in the copy; no after `limit_s`."""
     child = os.fork()
     if child == 0:
         os.setsid()
@@ -129,13 +129,13 @@ def difference(original: str, changed: str) -> str:
     return f"{number}: `{before.strip()}` → `{after.strip()}`"
 
 
-def limit(copy: Path, room: str, size: int) -> float:
-    """How long a room's tests may take, from how long they take without a fault; they must pass then."""
+def limit(copy: Path, group: str, size: int) -> float:
+    """How long a group's tests may take, from how long they take without a fault; they must pass then."""
     began = time.monotonic()
-    if not passes(copy, ROOMS[room][1], 1200.0):
-        sys.exit(f"the tests of {room} fail as they are: {ROOMS[room][1]}")
+    if not passes(copy, GROUPS[group][1], 1200.0):
+        sys.exit(f"the tests of {group} fail as they are: {GROUPS[group][1]}")
     took_s = time.monotonic() - began
-    print(f"{room}: {size} places, tests take {took_s:.0f} s", flush=True)
+    print(f"{group}: {size} places, tests take {took_s:.0f} s", flush=True)
     return max(LEAST_S, PATIENCE * took_s)
 
 
@@ -144,31 +144,32 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.mutants", description=__doc__)
     parser.add_argument("--minutes", type=float, default=20.0)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--room", action="append", choices=ROOMS, help="only this one (may be given several times)")
+    parser.add_argument("--group", action="append", choices=GROUPS, help="only this one (may be given several times)")
     parser.add_argument("--out", type=Path, default=HERE / "docs" / "mutants.md")
     options = parser.parse_args()
-    rooms = options.room or list(ROOMS)
-    left = {room: mutants(room, random.Random(f"{options.seed} {room}")) for room in rooms}
-    sizes, killed, survivors = {room: len(left[room]) for room in rooms}, dict.fromkeys(rooms, 0), {room: [] for room in rooms}
+    groups = options.group or list(GROUPS)
+    left = {group: mutants(group, random.Random(f"{options.seed} {group}")) for group in groups}
+    sizes, killed = {group: len(left[group]) for group in groups}, dict.fromkeys(groups, 0)
+    survivors: dict[str, list[str]] = {group: [] for group in groups}
     with tempfile.TemporaryDirectory(prefix="bns-mutants-") as folder:
         copy = Path(folder) / "bns"
         hidden = shutil.ignore_patterns(".git", ".venv", "results", ".mypy_cache", ".ruff_cache", ".hypothesis", "__pycache__")
         shutil.copytree(HERE, copy, ignore=hidden)
-        limits = {room: limit(copy, room, sizes[room]) for room in rooms}
+        limits = {group: limit(copy, group, sizes[group]) for group in groups}
         end = time.monotonic() + 60.0 * options.minutes
         while time.monotonic() < end and any(left.values()):
-            for room in [room for room in rooms if left[room]]:
-                mutant = left[room].pop()
+            for group in [group for group in groups if left[group]]:
+                mutant = left[group].pop()
                 try:
-                    lines = survives(copy, mutant, ROOMS[room][1], limits[room])
+                    lines = survives(copy, mutant, GROUPS[group][1], limits[group])
                 except LookupError:
                     continue
                 if lines is None:
-                    killed[room] += 1
+                    killed[group] += 1
                 else:
-                    survivors[room].append(f"{mutant.path}:{lines}")
+                    survivors[group].append(f"{mutant.path}:{lines}")
                 options.out.write_text(written(sizes, killed, survivors, options))
-                print("killed  " if lines is None else "SURVIVED", room, mutant.path, lines or "", flush=True)
+                print("killed  " if lines is None else "SURVIVED", group, mutant.path, lines or "", flush=True)
     options.out.write_text(written(sizes, killed, survivors, options))
 
 

@@ -18,9 +18,9 @@ def written(
     sizes: Mapping[str, int], killed: Mapping[str, int], survivors: Mapping[str, Sequence[str]], options: argparse.Namespace
 ) -> str:
     """The page, as Markdown."""
-    rows = [(room, sizes[room], killed[room] + len(survivors[room]), killed[room]) for room in sizes]
+    rows = [(group, sizes[group], killed[group] + len(survivors[group]), killed[group]) for group in sizes]
     rows.append(("all", *(sum(column) for column in zip(*(row[1:] for row in rows), strict=True))))
-    table = [f"| {room} | {size} | {tried} | {found} | {found / max(tried, 1):.0%} |" for room, size, tried, found in rows]
-    listed = [f"{room}: {text}" for room, texts in survivors.items() for text in texts]
+    table = [f"| {group} | {size} | {tried} | {found} | {found / max(tried, 1):.0%} |" for group, size, tried, found in rows]
+    listed = [f"{group}: {text}" for group, texts in survivors.items() for text in texts]
     page = [*table, "", "## Survivors", "", "```text", *listed, "```"]
     return HEAD.format(seed=options.seed, minutes=options.minutes) + "\n".join(page) + "\n"

@@ -293,6 +293,7 @@ def test_runs_whose_evaluations_are_gone_are_left_out_of_an_archive_and_no_archi
 def test_of_an_archive_runs_without_their_evaluations_do_not_count(tmp_path, monkeypatch):
     """As archives of an earlier release may have them."""
     monkeypatch.setattr("bns.store.archive.write.FINISHED", "SELECT sweep, run_id FROM runs")
+    monkeypatch.setattr("bns.store.read.views.DAMAGED", "ok")
     results = tmp_path / "results"
     archive_of(results, "grid", records(2, evaluations=3), tmp_path)
     for part in (results / "evals").rglob("*.parquet"):

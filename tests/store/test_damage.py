@@ -5,6 +5,7 @@ import os
 import shutil
 import time
 import warnings
+from pathlib import Path
 
 import pandas.testing as pdt
 import pyarrow as pa
@@ -64,6 +65,39 @@ def test_truncated_file_is_skipped_with_one_warning_and_set_aside(store, content
         assert set(finished(store, "s")).isdisjoint(lost)
     with pytest.warns(StoreWarning, match="gone"):
         assert set(load(store)["run_id"]) == ids_in(second)
+
+
+def garbled(path):
+    path.write_bytes(path.read_bytes()[:-100] + bytes(100))
+
+
+def one_bit_off(path):
+    data = bytearray(path.read_bytes())
+    data[len(data) // 3] ^= 1
+    path.write_bytes(bytes(data))
+
+
+@pytest.mark.filterwarnings("ignore::bns.store.StoreWarning")
+@pytest.mark.parametrize("harm", [garbled, one_bit_off, Path.unlink])
+def test_runs_whose_evaluations_are_damaged_say_so_until_they_are_repeated(store, harm):
+    with Writer(store, "s") as writer:
+        writer.append(failed(records(7)[6].spec))
+    first, second = files(store, "evals")
+    lost, kept = ids_in(first), ids_in(second)
+    harm(first)
+    runs = load(store, "runs").set_index("run_id")["status"]
+    assert set(runs[list(lost)]) == {"damaged"}
+    assert set(runs[list(kept)]) == {"ok"}
+    assert runs.drop([*lost, *kept]).tolist() == ["failed"]
+    counted = query(store, "SELECT status, count(*) AS n FROM runs GROUP BY status ORDER BY status")
+    assert counted.values.tolist() == [["damaged", 3], ["failed", 1], ["ok", 3]]
+    assert not lost & set(finished(store, "s"))
+    compact(store)
+    assert set(load(store, "runs", where={"status": "damaged"})["run_id"]) == lost
+    with Writer(store, "s") as writer:
+        for run in (run for run in records(6) if run.spec.run_id in lost):
+            writer.append(run)
+    assert set(load(store, "runs", where="run_id IN (SELECT run_id FROM evals)")["status"]) == {"ok"}
 
 
 def test_foreign_files_are_skipped_and_set_aside(store):
@@ -195,6 +229,12 @@ def test_empty_and_missing_results_name_the_commands_to_begin_with(tmp_path):
         with pytest.raises(StoreError, match=r"no results in .* bns sweep khepera-small, or"):
             load(results)
     assert not (tmp_path / "none").exists()
+    trial = tmp_path / "results" / "trials" / "khepera-circle-0"
+    trial.mkdir(parents=True)
+    (trial / "journal.jsonl").write_text("")
+    for results in (tmp_path / "results", trial):
+        with pytest.raises(StoreError, match=r"holds trials alone, and a trial is stored when it is complete: .* --resume"):
+            query(results, "SELECT 1")
     with pytest.raises(StoreError, match="the folder does not exist"):
         compact(tmp_path / "none")
 

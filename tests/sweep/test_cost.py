@@ -11,8 +11,8 @@ from bns.store import load
 from bns.sweep.executors import load_executor
 from bns.sweep.expand.grid import parse_sweep
 from bns.sweep.expand.shard import Shard
-from bns.sweep.forecast.cost import MACHINES, START_UP_S, Cost, Machine, cost_table, total
-from bns.sweep.forecast.plan import plan
+from bns.sweep.forecast.cost import MACHINES, Cost, Machine, cost_table, total
+from bns.sweep.forecast.plan import START_UP_S, plan, wall_s
 from bns.sweep.jobs.executor import SerialExecutor
 from bns.sweep.request import Request
 from bns.sweep.runner import run_sweep
@@ -37,6 +37,16 @@ def test_estimate_is_within_half_as_much_again_of_what_it_takes(tmp_path):
         if 1 / 1.5 < ratios[-1] < 1.5:
             return
     pytest.fail(f"foretold over measured time: {ratios}")
+
+
+def test_workers_start_and_work_in_rounds_and_one_worker_does_neither(tmp_path):
+    assert wall_s(60.0, 6, 2) == START_UP_S + 30
+    assert wall_s(60.0, 6, 4) == START_UP_S + 20  # four runs at once, then two
+    assert wall_s(0.0, 0, 4) == 0
+    sweep = parse_sweep(TEXT, Path("mixed.yaml"))
+    run_sweep(sweep, tmp_path, executor=SerialExecutor(), limit=3)
+    one, four = plan(sweep, tmp_path, 1), plan(sweep, tmp_path, 4)
+    assert four.seconds_estimate == pytest.approx(START_UP_S + one.seconds_estimate / one.remaining)
 
 
 def test_time_on_a_machine():
@@ -85,7 +95,7 @@ def test_command_prints_the_table_and_where_it_comes_from(sweep_file, tmp_path, 
         (["--jobs", "3"], "3 worker processes on"),
         (["--executor", "dask", "--jobs", "2"], "a Dask scheduler of its own with 2 worker processes"),
         (["--executor", "slurm", "--shards", "4", "--jobs", "8", "--try-locally"], "4 jobs of 8 worker processes, 1 array"),
-        (["--shard", "2/4"], "mixed: 1 runs, 0 done"),
+        (["--shard", "2/4"], "mixed: 1 run, 0 done"),
     ],
 )
 def test_dry_run_says_what_would_run_where(sweep_file, tmp_path, capsys, options, where):

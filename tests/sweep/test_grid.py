@@ -5,9 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from bns.errors import SpecError
+from bns.errors import ModelError, SpecError
 from bns.spec import FIELDS
 from bns.sweep.expand.grid import Sweep, load_sweep, load_sweeps
+from bns.sweep.forecast.plan import plan
+from bns.sweep.runner import run_sweep
 from bns.tasks import task_names
 
 HEAD = "name: demo\nrobot: khepera\n"
@@ -79,7 +81,7 @@ def test_include_without_a_grid_adds_nothing_else(tmp_path):
 
 def test_equal_combinations_are_one(tmp_path):
     sweep = sweep_of(
-        tmp_path, "grid: {mutation_rate: [0.1, 0.1, 0.2]}\ninclude: [{mutation_rate: 0.2, world: substitute}]"
+        tmp_path, "grid: {mutation_rate: [0.1, 0.2]}\ninclude: [{mutation_rate: 0.2, world: substitute}]"
     )
     assert sweep.combos == ({"mutation_rate": 0.1}, {"mutation_rate": 0.2})  # the order of runs goes by what is written
 
@@ -107,7 +109,17 @@ ERRORS = {
         "mutation_rate is 40.0; it must be a number from 0 to 1. For 40 percent write 0.4.",
     ),
     "type": ("fixed:\n  population_size: many\n", 4, "population_size is 'many'; it must be a whole number"),
-    "quoted": ("fixed:\n  mutation_rate: '0.1'\n", 4, "mutation_rate is '0.1'"),
+    "quoted": (
+        "fixed:\n  mutation_rate: '0.1'\n",
+        4,
+        "mutation_rate is '0.1'; it must be a number from 0 to 1. It is a text: write 0.1, without quotes.",
+    ),
+    "quoted seeds": ("seeds: '10'\n", 3, "how many, from first_seed on. It is a text: write 10, without quotes."),
+    "value twice": (
+        "grid:\n  evaluations:\n    - 1\n    - 2\n    - 1\n",
+        7,
+        "evaluations has the value 1 twice (first on line 5). Keep one of the two",
+    ),
     "list in fixed": ("fixed:\n  mutation_rate: [0.1]\n", 4, "Lists belong under grid"),
     "value in grid": (
         "grid:\n  mutation_rate: 0.1\n",
@@ -205,3 +217,16 @@ def test_two_files_of_one_name_are_not_carried_out_together(tmp_path):
     assert [sweep.name for sweep in load_sweeps(files)] == ["both", "other"]
     with pytest.raises(SpecError, match="named both"):
         load_sweeps([files[0], files[0]])
+
+
+def test_a_world_that_is_no_file_is_named_with_its_line_once_a_run_needs_it(tmp_path):
+    sweep = sweep_of(tmp_path, "fixed: {evaluations: 2}\ngrid:\n  world:\n    - physics\n    - nonexist.yaml\n")
+    for use in (lambda: plan(sweep, tmp_path / "results", 1), lambda: run_sweep(sweep, tmp_path / "results", jobs=1)):
+        with pytest.raises(ModelError, match=rf"^{sweep.path}:7: .*nonexist\.yaml"):
+            use()
+    assert not (tmp_path / "results").exists()
+
+
+def test_values_under_zip_may_come_twice(tmp_path):
+    sweep = sweep_of(tmp_path, "zip: {evaluations: [1, 1], population_size: [2, 3]}")
+    assert [combo["population_size"] for combo in sweep.combos] == [2, 3]

@@ -156,6 +156,7 @@ def test_workers_end_with_their_parent(tmp_path, start):
     wait_for(lambda: not any(alive(worker) for worker in workers(tmp_path)), "the workers to end")
 
 
+@pytest.mark.slow
 def test_two_sweeps_fill_one_store_at_once(tmp_path, start):
     both = [start(tmp_path / "a", 1, "short", name) for name in ("one", "two")]
     assert [summary_of(process)["done"] for process in both] == [16, 16]

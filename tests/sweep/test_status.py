@@ -17,7 +17,7 @@ from bns.store.read.reader import load
 from bns.store.record import RunRecord
 from bns.sweep.expand.grid import parse_sweep
 from bns.sweep.forecast.pace import Pace
-from bns.sweep.forecast.plan import plan, work
+from bns.sweep.forecast.plan import START_UP_S, plan, work
 from bns.sweep.jobs.executor import SerialExecutor
 from bns.sweep.jobs.job import run_job
 from bns.sweep.progress import SweepProgress, describe_rate
@@ -172,7 +172,7 @@ def test_plan_from_stored_runs_is_their_mean(tmp_path):
     serial(sweep, tmp_path, limit=4)  # both population sizes, seeds 0 and 1
     found = plan(sweep, tmp_path, 2, job=pytest.fail)
     assert (found.total, found.done, found.remaining) == (8, 4, 4)
-    assert found.seconds_estimate == pytest.approx((2 * 1.0 + 2 * 1.1) / 2)
+    assert found.seconds_estimate == pytest.approx(START_UP_S + (2 * 1.0 + 2 * 1.1) / 2)
     assert found.basis == "the mean of 4 stored runs of this sweep"
     assert 100 < found.bytes_estimate < 1e6
     serial(sweep, tmp_path)
@@ -200,10 +200,10 @@ def test_plan_without_results_times_one_short_run(tmp_path):
     assert [calls[0], calls[1].evaluations, len(calls)] == ["warm", 20, 2]
     assert found.basis == "the parts of one trial run of 20 evaluations (0.11 s)"
     # Training on 6, 12, ... 600 patterns, evolution of 10 controllers, the rest; four runs by two workers.
-    assert found.seconds_estimate == pytest.approx(2 * (1000 * (100 * 1e-6 + 30300 * 5e-8) + 100 * (210e-6 + 1e-3)))
+    assert found.seconds_estimate - START_UP_S == pytest.approx(2 * (1000 * (100 * 1e-6 + 30300 * 5e-8) + 100 * (210e-6 + 1e-3)))
     assert found.bytes_estimate == 4 * 100 * 100
     more = plan(sweep, tmp_path / "none", 64, job=trial)  # a run cannot be divided
-    assert more.seconds_estimate == pytest.approx(found.seconds_estimate / 2)
+    assert more.seconds_estimate - START_UP_S == pytest.approx((found.seconds_estimate - START_UP_S) / 2)
     assert not (tmp_path / "none").exists()
 
 

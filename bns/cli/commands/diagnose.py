@@ -61,9 +61,12 @@ def add_commands(command: Adder) -> None:
     more.rewrite = data_first
     more.add_argument("data", type=Path, metavar="DATA", help="log: .csv, .parquet, or any file with a mapping")
     more.add_argument(
-        "effects", nargs="+", metavar="EFFECT", help="names of effects or Python files; with --term, a name for the formula"
+        "effects",
+        nargs="+",
+        metavar="EFFECT",
+        help="names of effects or Python files; with --term, one of them is a new name, for the formula",
     )
-    more.add_argument("--term", metavar="FORMULA", help="a formula instead of a listed effect: 'k * v * abs(w)'")
+    more.add_argument("--term", metavar="FORMULA", help="a formula for the name that is no listed effect's: 'k * v * abs(w)'")
     more.add_argument(
         "--on",
         default="v",

@@ -19,6 +19,7 @@ from bns.diagnose.data.checks import Finding, checked, whole_names
 from bns.diagnose.data.located import BEGINS
 from bns.diagnose.data.mapping import mapping_beside
 from bns.diagnose.data.sources.read import read_table
+from bns.diagnose.data.stamps import stamp_scatter
 from bns.diagnose.data.tracker_faults import jumps, without_faults
 from bns.diagnose.data.tracks import Tracks, tracks_of
 from bns.errors import DataError, in_both
@@ -103,7 +104,16 @@ def _tracks(table: pd.DataFrame) -> tuple[Tracks, list[Finding]]:
     usable, findings = checked(table)
     tracks = tracks_of(usable)
     found = jumps(tracks)
-    return without_faults(tracks, found), [*findings, *_jump_findings(tracks, usable, found)]
+    seen = without_faults(tracks, found)
+    return seen, [*_stamp_findings(seen, usable), *findings, *_jump_findings(tracks, usable, found)]
+
+
+def _stamp_findings(tracks: Tracks, usable: pd.DataFrame) -> Iterator[Finding]:
+    """Stamps that scatter, in words, at the first pose."""
+    scatter = stamp_scatter(tracks)
+    if scatter is not None:
+        row = int(usable.index[usable[list(POSE)].notna().all(axis=1)][0])
+        yield Finding(tracks.names[0], row, scatter.in_words)
 
 
 def _jump_findings(tracks: Tracks, usable: pd.DataFrame, found: NDArray[np.bool_]) -> Iterator[Finding]:

@@ -69,12 +69,24 @@ def _of_trial(tracks: Tracks, trial: int, frames: slice, usual: tuple[float, flo
     fresh = (moved > 0) | (turned > 0)
     fresh_at = np.maximum.accumulate(np.where(np.append(True, fresh), np.arange(len(t_s)), 0))
     lasted = t_s[1:] - t_s[fresh_at[:-1]]  # since the pose last changed: slow trackers repeat theirs
+    nominal_s = float(np.median(lasted))
+    lasted = _at_most(lasted, nominal_s)
     way = _fastest(tracks, trial, t_s)[1:] * lasted
     if len(t_s) >= FEWEST_FRAMES:
         usual = _usual(moved, turned)
-    frames_long = np.maximum(lasted / np.median(lasted), 1.0)  # after a gap, the robot has gone on
+    frames_long = np.maximum(lasted / nominal_s, 1.0)  # after a gap, the robot has gone on
     far = moved > np.maximum(np.maximum(LEAST_M, WAYS * way), USUAL * usual[0] * frames_long)
     return np.asarray(far | (turned > np.maximum(LEAST_RAD, USUAL * usual[1]) * frames_long))
+
+
+def _at_most(lasted: Array, nominal_s: float) -> Array:
+    """How long the robot may have driven between poses, s, (n,), where they were stamped ``lasted`` apart.
+
+    A pose that was stamped late comes after a long interval and before a short one: the next pose, on time, shows what the robot
+    drove in all that time. No frame is shorter than a nominal one.
+    """
+    late = np.append(0.0, np.maximum(lasted[:-1] - nominal_s, 0.0))
+    return np.maximum(lasted + late, nominal_s)
 
 
 def _changes(pose: Array) -> tuple[Array, Array]:

@@ -1,31 +1,29 @@
 """How much a tracked pose scatters, from the tracks alone: at rest, and at high frequency. No model has a say in it.
 
-Poses of a robot that stands, after commands of zero, scatter by the tracker's noise alone, slow wander of the picture
-included. A robot that creeps instead, down a slope for example, leaves a line, about which they scatter. While it drives under
-one command, a parabola through a few frames follows it and the rest is noise, white noise at least: slow noise
-follows the parabola, so this is a lower bound where the robot never stands.
+Poses of a robot that rests, after commands of zero, scatter by the tracker's noise alone, slow wander of the picture
+included; those in which it still coasts are left out (`rests`). A robot that creeps instead, down a slope for example, leaves a
+line, about which they scatter. While it drives under one command, a parabola through a few frames follows it and the rest is
+noise, white noise at least: slow noise follows the parabola, so this is a lower bound where the robot never rests.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
+from bns.diagnose.data.rests import settled, told_to_stand
+from bns.diagnose.data.robust import robust_sd
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.settings import DEFAULTS
 
-SETTLED_S = DEFAULTS.data.settled_s
 FEWEST_AT_REST = DEFAULTS.data.fewest_at_rest
 DRIFTS = DEFAULTS.data.drift_at_rest
 WIDTH = DEFAULTS.data.parabola_frames
 ORDER = DEFAULTS.data.parabola_order
 SLOWEST_HZ = DEFAULTS.data.parabola_slowest_hz
 _DRIVING = "high frequency"
-_NORMAL = 0.6745
-"""Median of a standard normal number's size."""
 
 
 @dataclass(frozen=True)
@@ -55,24 +53,11 @@ def tracking_noise(tracks: Tracks) -> TrackingNoise | None:
     """The noise of these tracks; None where they cannot tell (poses at the ends of commands alone, say)."""
     if not (tracks.left_m_s.any() or tracks.right_m_s.any()):
         return None  # no wheels, or a robot that was never told to move
-    rest = list(_at_rest(tracks))
-    if sum(len(t_s) for t_s, _ in rest) >= FEWEST_AT_REST:
-        still, creeping = (_pooled([_about(t_s, pose, order) for t_s, pose in rest], "at rest") for order in (0, 1))
+    rests = settled(list(told_to_stand(tracks)))
+    if sum(len(rest.t_s) for rest in rests) >= FEWEST_AT_REST:
+        still, creeping = (_pooled([_about(rest.t_s, rest.pose, order) for rest in rests], "at rest") for order in (0, 1))
         return creeping if creeping.position_m < DRIFTS * still.position_m else still
     return _high_frequency(tracks)
-
-
-def _at_rest(tracks: Tracks) -> Iterator[tuple[Array, Array]]:
-    """Times (n,) and poses (n, 3) of each rest, headings unwrapped, as far as they tell of noise."""
-    for trial, (a, b) in enumerate(pairwise(tracks.first)):
-        t_s, ends = tracks.t_s[a:b], np.cumsum(tracks.duration_s[trial])
-        still = (tracks.left_m_s[trial] == 0) & (tracks.right_m_s[trial] == 0)
-        for k in np.flatnonzero(still):
-            begin = ends[k] - tracks.duration_s[trial][k] + SETTLED_S
-            inside = (t_s >= begin) & (t_s <= ends[k])
-            if inside.sum() >= 5:  # fewer share their mean with their noise
-                pose = tracks.pose[a:b][inside]
-                yield t_s[inside], np.column_stack([pose[:, :2], np.unwrap(pose[:, 2])])
 
 
 def _about(t_s: Array, pose: Array, order: int) -> Array:
@@ -86,11 +71,6 @@ def _about(t_s: Array, pose: Array, order: int) -> Array:
 def _pooled(parts: list[Array], basis: str) -> TrackingNoise:
     off = np.concatenate(parts)
     return TrackingNoise(float(robust_sd(off[:, :2])), float(robust_sd(off[:, 2])), basis)
-
-
-def robust_sd(off: Array, axis: int | None = None) -> Array:
-    """Standard deviation about zero by the median of the sizes: single faults of a marker do not count."""
-    return np.asarray(np.median(np.abs(off), axis=axis) / _NORMAL)
 
 
 def _high_frequency(tracks: Tracks) -> TrackingNoise | None:

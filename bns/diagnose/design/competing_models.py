@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
+from bns.diagnose.design.planned import delays_of
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_with
+from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.result import SelectionResult
 from bns.diagnose.settings import DEFAULTS
@@ -57,6 +59,22 @@ def competing_models_of(d: Diagnosis) -> tuple[CompetingModel, ...]:
     others = [CompetingModel(names, refitted(problem, selection.fit, names, effects)) for names in sets]
     others.sort(key=lambda competitor: float(competitor.fit.held_out.sum()))
     return (first, *others[: (MOST_TIED if selection.competing_models else MOST) - 1])
+
+
+def with_exact_delays(
+    problem: Problem, models: Sequence[CompetingModel]
+) -> tuple[Problem, tuple[CompetingModel, ...]]:
+    """The same explanations, fitted where the delays of all of them are exact; as they are without any, or of a body.
+
+    A delay that ends inside a step of the grid is predicted a little wrongly. Two explanations that are the same, a late command
+    and a late clock, then have other numbers of all effects that they share, too, and differ wherever these matter most.
+    """
+    delays_s, predictor = delays_of(model.fit.model for model in models), problem.predictor
+    if not delays_s or not isinstance(predictor, WheelPredictor):
+        return problem, tuple(models)
+    predictor = predictor.exact_for(delays_s)
+    exact = Problem(predictor, problem.pose_filter, predictor.counted)
+    return exact, tuple(CompetingModel(model.names, exact.fit(model.fit.model)) for model in models)
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from scipy.linalg import block_diag
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.design.competing_models import CompetingModel
-from bns.diagnose.design.planned import noise_free_predictor, planned_tracks
+from bns.diagnose.design.planned import delays_of, noise_free_predictor, planned_tracks
 from bns.diagnose.design.sequences import Arena, Sequences
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.noise import huber
@@ -36,7 +36,8 @@ Pair = tuple[int, int]
 class Discrimination:
     """Sums of each planned trial for one pair in one direction: d'd (trials,), J'd (trials, p), J'J (trials, p, p).
 
-    J = (J_B, J_A), the first ``split`` columns B's. ``prior`` (p, p): H of both; ``spread``: C.
+    J = (J_B, J_A), the first ``split`` columns B's. ``prior`` (p, p): H of both; ``spread``: C. ``measured`` (trials,): how many
+    numbers each trial measures.
     """
 
     squared: Array
@@ -45,11 +46,16 @@ class Discrimination:
     prior: Array
     spread: Array
     split: int
+    measured: Array
 
     def only(self, chosen: NDArray[np.int64]) -> Discrimination:
         """Some of the trials."""
         return replace(
-            self, squared=self.squared[chosen], gradient=self.gradient[chosen], information=self.information[chosen]
+            self,
+            squared=self.squared[chosen],
+            gradient=self.gradient[chosen],
+            information=self.information[chosen],
+            measured=self.measured[chosen],
         )
 
     def joined(self, other: Discrimination) -> Discrimination:
@@ -59,6 +65,7 @@ class Discrimination:
             squared=np.concatenate([self.squared, other.squared]),
             gradient=np.concatenate([self.gradient, other.gradient]),
             information=np.concatenate([self.information, other.information]),
+            measured=np.concatenate([self.measured, other.measured]),
         )
 
     def of(self, squared: Array, gradient: Array, information: Array) -> Array:
@@ -74,6 +81,11 @@ class Discrimination:
     def total(self) -> float:
         """The discrimination of all the trials together."""
         return float(self.of(*(v.sum(axis=0)[None] for v in (self.squared, self.gradient, self.information)))[0])
+
+    def rms(self) -> float:
+        """What all the trials together leave between the two once both have adjusted: root mean square over all that is measured,
+        in standard deviations of its noise."""
+        return float(np.sqrt(self.total() / max(float(self.measured.sum()), 1.0)))
 
     def each(self) -> Array:
         """What each trial has of `total`, all having adjusted to all of them, (trials,)."""
@@ -127,8 +139,9 @@ def discriminations(
     errors: list[list[tuple[Array, Array]]] = []
     inside = np.ones(len(plan), dtype=bool)
     problems = []
+    delays_s = delays_of(competitor.fit.model for competitor in competing_models)
     for true in competing_models:
-        predictor = noise_free_predictor(true.fit.model, tracks)
+        predictor = noise_free_predictor(true.fit.model, tracks, delays_s)
         steps = predictor.steps(true.fit.model)
         problem = problem_with_noise(predictor, steps, noise)
         problems.append(problem)
@@ -180,4 +193,5 @@ def _sums(
         block_diag(curvature_of(of_other), curvature_of(of_true)),
         of_true.covariance,
         len(of_other.free),
+        problem.per_trial(np.full(len(error), float(error.shape[1]))),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,8 @@ from bns.diagnose.settings import DEFAULTS
 from bns.physics.model import Model
 
 _PLACE_ROUNDS = DEFAULTS.design.place_rounds
+_SHIFTS = ("command-delay", "clock-offset")
+"""Effects that do the same as each other: what is seen comes a constant time after the command."""
 
 
 def planned_tracks(
@@ -38,13 +41,25 @@ def planned_tracks(
     )
 
 
-def noise_free_predictor(model: Model, tracks: Tracks) -> WheelPredictor:
-    """A predictor on the tracks that the model says will be seen, free of noise, each from its first pose."""
-    predictor = WheelPredictor(tracks)
+def delays_of(models: Iterable[Model]) -> tuple[float, ...]:
+    """Constant times (s) by which any of the models lets commands or stamps be late."""
+    acting = (active for model in models for active in model.effects if active.effect.name in _SHIFTS)
+    return tuple(sorted({float(value) for active in acting for value in active.values}))
+
+
+def noise_free_predictor(model: Model, tracks: Tracks, delays_s: Iterable[float] = ()) -> WheelPredictor:
+    """A predictor on the tracks that the model says will be seen, free of noise, each from its first pose.
+
+    ``delays_s``: of all models that are compared on these tracks (`delays_of`). A delay that ends inside a step of the grid is
+    predicted a little wrongly, otherwise than a clock's offset that really does the same; and a search for commands that drive
+    the two apart would find those of the largest such errors.
+    """
+    delays_s = tuple(delays_s)
+    predictor = WheelPredictor(tracks, delays_s=delays_s)
     placed = any(model.at("world")) or any(active.effect.needs_place for active in model.effects)
     for _ in range(_PLACE_ROUNDS if placed else 1):
         tracks = replace(tracks, pose=laid_paths(tracks, predictor.steps(model)))
-        predictor = WheelPredictor(tracks)
+        predictor = WheelPredictor(tracks, delays_s=delays_s)
     return predictor
 
 

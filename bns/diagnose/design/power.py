@@ -78,6 +78,19 @@ def power(expected: ExpectedGain, seed: int = 0) -> float:
     return float(distinguished(mean, se, worth, trials).mean())
 
 
+def expected_standard_errors(expected: ExpectedGain) -> float:
+    """The gain that old and new trials together are expected to show, in its own standard errors; 0 of fewer than two trials.
+
+    The diagnosis calls a pair decided from `TIE_Z` of them on.
+    """
+    trials = len(expected.old) + len(expected.new)
+    if trials < 2:
+        return 0.0
+    means = np.concatenate([expected.old, expected.new / 2])
+    squares = float(((means - means.mean()) ** 2).sum() + expected.scatter * expected.new.sum())
+    return float(means.sum() / np.sqrt(max(squares * trials / (trials - 1), 1e-12)))
+
+
 def decision_probability(both: Sequence[ExpectedGain]) -> float:
     """`power` whichever of two explanations is true, weighed by their chances."""
     return sum(e.chance * power(e) for e in both)

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from bns.diagnose.data.tracks import Array
-from bns.diagnose.design.competing_models import CompetingModel, competing_models_of, model_pairs_of, without_last
+from bns.diagnose.design.competing_models import (
+    CompetingModel,
+    competing_models_of,
+    model_pairs_of,
+    with_exact_delays,
+    without_last,
+)
 from bns.diagnose.design.discrimination import Discrimination, ExperimentSetup, Pair
 from bns.diagnose.design.independent_measurement import independent_measurements
 from bns.diagnose.design.planners import Planner, WheelPlanner
@@ -18,6 +25,7 @@ from bns.diagnose.design.power import (
     ExpectedGain,
     PastTrials,
     decision_probability,
+    expected_standard_errors,
     minutes_needed,
     negligible_difference,
     overdispersion_of,
@@ -38,6 +46,8 @@ from bns.physics.effects import all_effects
 LONGEST_MINUTES = DEFAULTS.design.longest_minutes
 TARGET_POWER = DEFAULTS.design.target_power
 MOST_FASTER = DEFAULTS.design.most_faster
+ALIKE_RMS = DEFAULTS.design.alike_rms
+LEAST_ERRORS = DEFAULTS.design.least_standard_errors
 _DENSE = DEFAULTS.design.dense
 _POINTS = DEFAULTS.design.power_points
 
@@ -49,7 +59,8 @@ class ModelPair:
     ``indistinguishable``: no command sequence tells them apart; ``independent_measurements`` would.
     ``times_faster``: as many times as long plain random commands would take.
     ``already_decided``: what was measured so far decides. ``power_by_minutes``: minutes of the planned driving and the
-    chance of a decision by then; empty where no commands would decide.
+    chance of a decision by then; empty where no commands would decide. ``standard_errors``: how large the difference is expected
+    to be after the experiment, whichever is true; the diagnosis takes 2 (`tie_z`) for decided.
     """
 
     first: str
@@ -61,11 +72,17 @@ class ModelPair:
     already_decided: bool
     independent_measurements: tuple[str, ...]
     power_by_minutes: tuple[tuple[float, float], ...] = ()
+    standard_errors: float = math.inf
+
+    @property
+    def no_decision(self) -> bool:
+        """Would commands decide, but hardly any experiment of this length?"""
+        return not (self.indistinguishable or self.already_decided) and self.standard_errors < LEAST_ERRORS
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """An experiment. ``plan`` has no trials where no commands would tell anything.
+    """An experiment. ``plan`` has no trials where no commands, or none of this length, would tell anything.
 
     ``arena``, ``bounds``: of a robot on wheels; None for one on joints, which repeats cycles.
     """
@@ -151,6 +168,9 @@ def propose(
         raise DataError(
             f"No two explanations are left that an experiment could tell apart (verdict {d.verdict}): {why}"
         )
+    assert d.selection is not None
+    problem, competing_models = with_exact_delays(d.selection.problem, competing_models)
+    d = replace(d, selection=replace(d.selection, problem=problem))
     planner = _planner(d, competing_models, arena, bounds, minutes, tick)
     rng = np.random.default_rng(seed)
     past = {(a, b): _past(d, competing_models[a], competing_models[b]) for a, b in planner.pairs}
@@ -159,7 +179,7 @@ def propose(
     plain = planner.random(rng, competing_models, len(best.plan))
     tick("power")
     model_pairs = _model_pairs(d, competing_models, best, plain, planner, past)
-    decidable = any(not c.indistinguishable for c in model_pairs)
+    decidable = any(not (c.indistinguishable or c.no_decision) for c in model_pairs)
     plan = best.plan if decidable else best.plan.only(np.array([], dtype=np.int64))
     assert isinstance(plan, Sequences | Repeats)
     predictor = planner.problem.predictor if isinstance(planner, RepeatPlanner) else None
@@ -211,7 +231,8 @@ def _model_pairs(
             for each in (planned, random)
         )
         minutes = _minutes(both, planned[(a, b)], best.plan.lasting_s, scatter)
-        indistinguishable = minutes > LONGEST_MINUTES or negligible_difference(both)
+        alike = all(one.rms() < ALIKE_RMS for one in planned[(a, b)])
+        indistinguishable = alike or minutes > LONGEST_MINUTES or negligible_difference(both)
         longer = _minutes(as_random, random[(a, b)], plain.plan.lasting_s, scatter) / max(minutes, 1e-12)
         out.append(
             ModelPair(
@@ -224,6 +245,7 @@ def _model_pairs(
                 decision_probability([e.first(0) for e in both]) >= TARGET_POWER,
                 tuple(independent_measurements(one.effects, other.effects)),
                 () if indistinguishable else _power_by_minutes(both, best.plan.lasting_s),
+                0.0 if indistinguishable else sum(e.chance * expected_standard_errors(e) for e in both),
             )
         )
     return out

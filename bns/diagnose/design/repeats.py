@@ -97,6 +97,7 @@ class RepeatPlanner:
                 block_diag(curvature_of(of_other), curvature_of(of_true)),
                 of_true.covariance,
                 len(of_other.free),
+                np.diff(first) * float(error.shape[1]),
             ).only(plan.chosen)
 
         return {(a, b): (direction(a, b), direction(b, a)) for a, b in pairs}

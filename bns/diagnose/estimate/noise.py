@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from scipy.optimize import minimize
 
-from bns.diagnose.data.tracking_noise import robust_sd
+from bns.diagnose.data.robust import robust_sd
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.predict.base import Predictor, Steps
 from bns.diagnose.settings import DEFAULTS

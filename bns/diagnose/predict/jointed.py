@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.data.bodies.stretches import StretchTracks, apart, poses_of
-from bns.diagnose.data.tracking_noise import robust_sd
+from bns.diagnose.data.robust import robust_sd
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.predict.base import Predictor, Steps
 from bns.diagnose.predict.luck import Luck, luck_of

@@ -54,6 +54,12 @@ class Change:
     change_m: float
     low_m: float
     high_m: float
+    median_rose: bool = False
+    """Is the median error higher, whatever the luck of the trials, by `least_fall` or more?
+
+    What is there lowers the error wherever it acts. What stands for rare large errors of another kind lowers these, and with
+    them the root mean square, at the cost of most windows.
+    """
 
     @property
     def certainty(self) -> float:
@@ -76,8 +82,8 @@ _UNKNOWN = Change(float("nan"), float("nan"), float("nan"))
 
 
 def _rises(change: Change, before_m: float) -> bool:
-    """Is the error certainly higher, by as much as an effect must lower it (`least_fall`)?"""
-    return change.rose and change.change_m >= LEAST_FALL * before_m
+    """Is the error, or its median, certainly higher, by as much as an effect must lower it (`least_fall`)?"""
+    return change.median_rose or (change.rose and change.change_m >= LEAST_FALL * before_m)
 
 
 def _falls(changes: Sequence[tuple[Change, float]]) -> bool:
@@ -136,13 +142,14 @@ class PairedErrors:
 
     @property
     def rose_in_the_end(self) -> tuple[str, ...]:
-        """Horizons at which it certainly rises there, by `least_fall` or more."""
+        """Horizons at which it, or its median, certainly rises there, by `least_fall` or more."""
         return tuple(h for h, e in self.horizons.items() if e.changes and _rises(e.changes[-1], e.models[-2].rms_m))
 
     def between(self, before: str, after: str) -> bool:
         """Does the error fall from one model to the one that follows it?
 
-        The horizon at which the change is surest decides; at none may it rise for certain, by `least_fall` or more.
+        The horizon at which the change is surest decides; at none may it rise for certain, by `least_fall` or more, nor the
+        median.
         """
         return _falls([(e.change_between(before, after), e.rms_of(before)) for e in self.horizons.values()])
 
@@ -210,9 +217,10 @@ def _noise_of(predictor: Predictor) -> TrackingNoise | None:
 
 @dataclass(frozen=True)
 class _Judged:
-    """One model over the windows of a horizon: sums of squares by trial (trials,), the root mean square of every bootstrap sample
-    (draws,), and its numbers under no name."""
+    """One model over the windows of a horizon: its errors (windows,), sums of squares by trial (trials,), the root mean square of
+    every bootstrap sample (draws,), and its numbers under no name."""
 
+    position_m: Array
     squares: Array
     drawn: Array
     summary: ModelError
@@ -248,7 +256,7 @@ class _Windows:
         drawn = self.draws.rms(squares)
         low, high = self.draws.interval(drawn)
         summary = ModelError("", _rms(position_m), low, high, _median(position_m), _rms(e.heading_rad[self.kept]))
-        return _Judged(squares, drawn, summary)
+        return _Judged(position_m, squares, drawn, summary)
 
     def errors(self, models: Sequence[tuple[str, _Judged]]) -> HorizonErrors:
         """Several models and the changes between them."""
@@ -264,7 +272,14 @@ class _Windows:
         if not windows:
             return _UNKNOWN
         change = float(np.sqrt(after.squares.sum() / windows) - np.sqrt(before.squares.sum() / windows))
-        return Change(change, *self.draws.interval(after.drawn - before.drawn))
+        return Change(change, *self.draws.interval(after.drawn - before.drawn), self._median_rose(before, after))
+
+    def _median_rose(self, before: _Judged, after: _Judged) -> bool:
+        """As `Change.median_rose`; the medians of the samples are asked for only where the median of all windows is higher."""
+        if not after.summary.median_m >= (1.0 + LEAST_FALL) * before.summary.median_m:
+            return False
+        risen = self.draws.medians(after.position_m, self.of_trial) - self.draws.medians(before.position_m, self.of_trial)
+        return self.draws.interval(risen)[0] > 0.0
 
 
 @lru_cache(maxsize=4)
@@ -294,6 +309,15 @@ class _Draws:
             return np.zeros(0)
         out: Array = np.sqrt(self.drawn @ squares[self.used] / (self.drawn @ self.windows))
         return out
+
+    def medians(self, values: Array, of_trial: NDArray[np.int64]) -> Array:
+        """Median over the windows of every sample, (draws,); ``values``, ``of_trial`` (windows,). Empty where trials are few."""
+        if self.drawn is None:
+            return np.zeros(0)
+        order, place = np.argsort(values), np.cumsum(self.used) - 1
+        of_ordered = place[of_trial[order]]
+        often = (drawn[of_ordered].cumsum() for drawn in self.drawn)  # all at once: as many numbers as draws times windows
+        return np.asarray(values[order][[int(np.searchsorted(n, n[-1] / 2)) for n in often]])
 
     @staticmethod
     def interval(values: Array) -> tuple[float, float]:

@@ -83,7 +83,8 @@ class _Level:
 
     def _all_simulated(self, plant: Plant, stretches: NDArray[np.int64]) -> Array:
         simulator, rest = self.simulator.only(stretches), self._rest(stretches)
-        if (np.minimum(plant.stiffness, plant.torque) < 1).any():  # a servo that gives no torque did not bring its joint anywhere
+        held = (plant.friction_rad > 0).any() or (np.minimum(plant.stiffness, plant.torque) < 1).any()
+        if held:  # a servo that gives no torque, or too little for the friction of its joint, did not bring it anywhere
             rest = replace_state(rest, simulator.settled(plant))
         out = _stacked(simulator.sightings(plant, rest))
         if plant.key == simulator.machine.plant.key:

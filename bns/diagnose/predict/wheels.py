@@ -51,9 +51,10 @@ class WheelPredictor:
     luck: Luck | None = None
     screening = None
 
-    def __init__(self, tracks: Tracks, dt_s: float = 0.04) -> None:
-        self.tracks, self._dt_s = tracks, dt_s
-        self.grid = _grid_of(tracks, dt_s)
+    def __init__(self, tracks: Tracks, dt_s: float = 0.04, delays_s: Collection[float] = ()) -> None:
+        """``dt_s`` (s): longest step of the grid. ``delays_s`` (s): of commands or of poses' stamps, for which it is exact."""
+        self.tracks, self._dt_s, self._delays_s = tracks, dt_s, tuple(delays_s)
+        self.grid = _grid_of(tracks, dt_s, self._delays_s)
         self._place = np.stack([self._seen_on_grid(name) for name in ("x_m", "y_m", "heading_rad")], axis=2)
         seen = np.where(_between_frames(tracks, self.grid)[..., None], self._place, np.nan)
         self.conditions = replace(_conditions(tracks, self.grid.node_s), seen=seen)
@@ -71,11 +72,17 @@ class WheelPredictor:
         self._body, self._at = lru_cache(kept)(self._driven), lru_cache(kept)(self._followed)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.tracks, self._dt_s)  # what it remembers is worked out again
+        return type(self), (self.tracks, self._dt_s, self._delays_s)  # what it remembers is worked out again
 
     def driving(self, tracks: Tracks) -> WheelPredictor:
         """The predictor of other tracks, or of the same ones with other commands, on a grid that is as fine."""
-        return WheelPredictor(tracks, self._dt_s)
+        return WheelPredictor(tracks, self._dt_s, self._delays_s)
+
+    def exact_for(self, delays_s: Collection[float]) -> WheelPredictor:
+        """The same tracks, on a grid on which these delays (s) of commands and of stamps are exact."""
+        out = WheelPredictor(self.tracks, self._dt_s, delays_s)
+        out.counted = self.counted
+        return out
 
     def not_counting(self, trials: Collection[int]) -> WheelPredictor:
         """The same tracks, of which these trials count nothing in a fit; what is predicted of them is judged all the same."""
@@ -287,16 +294,21 @@ def predictor_for_search(tracks: Tracks) -> WheelPredictor:
     return WheelPredictor(slim) if slim is tracks else WheelPredictor(slim, dt_s=_COARSE_S)
 
 
-def _grid_of(tracks: Tracks, dt_s: float) -> Grid:
-    """Steps of at most ``dt_s`` that end wherever a command or a frame does: a pose inside a step would lie on a chord."""
+def _grid_of(tracks: Tracks, dt_s: float, delays_s: Sequence[float] = ()) -> Grid:
+    """Steps of at most ``dt_s`` that end wherever a command or a frame does: a pose inside a step would lie on a chord.
+
+    ``delays_s``: they also end so long after each command and so long before each frame: neither a late change of speed nor
+    the pose behind a late stamp then lies inside a step.
+    """
     nodes, lefts, rights = [], [], []
     for trial in range(len(tracks)):
         frames = tracks.t_s[tracks.first[trial] : tracks.first[trial + 1]]
         lead = 0.0 if tracks.lead_s is None else tracks.lead_s[trial]
         ends = np.cumsum(tracks.duration_s[trial])
-        marks = np.unique(
-            np.concatenate([[0.0, lead], ends, frames[frames >= 0], [max(ends[-1], *frames[-1:]) + _TAIL_S]]).round(9)
-        )
+        last = max(ends[-1], *frames[-1:]) + _TAIL_S
+        late = [part for d in delays_s for part in (np.append(0.0, ends) + d, frames - d)]
+        marks = np.concatenate([[0.0, lead, last], ends, frames, *late]).round(9)
+        marks = np.unique(marks[(marks >= 0) & (marks <= last)])
         longest = np.where(marks[1:] <= lead + 1e-9, max(dt_s, _RUN_UP_STEP_S), dt_s)
         counts = np.maximum(np.ceil(np.diff(marks) / longest - 1e-9).astype(np.int64), 1)
         inner = np.concatenate([[0.0], np.repeat(np.diff(marks) / counts, counts)])

@@ -15,12 +15,13 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
-from bns.diagnose.adding import ExtendedModel, add_effects
+from bns.diagnose.adding import ExtendedModel, Memory, add_effects
 from bns.diagnose.comparison import Comparison, compare
 from bns.diagnose.data.bodies.stretches import StretchTracks
 from bns.diagnose.data.load import Measured
 from bns.diagnose.design.proposal import Proposal
 from bns.diagnose.diagnosis import Diagnosis
+from bns.diagnose.estimate.starts import fitting
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.report import tables
 from bns.diagnose.report.figures import comparison_figure, diagnosis_figure, error_by_step_figure
@@ -70,7 +71,11 @@ def gathered(
     if d.selection is not None and d.effects:
         tick("the error, step by step")
         added = {a.effect.name: (a.effect, a.written) for a in d.selection.fit.model.effects}
-        extended = add_effects(predictor, model, [added[name] for name in d.effects], measured)
+        memory, searched = Memory(), d.selection.problem.predictor
+        memory.know(
+            model, d.selection.problem, d.selection.fit, [fitting(added[n][0], model, searched.tracks) for n in d.effects]
+        )
+        extended = add_effects(searched, model, [added[name] for name in d.effects], measured, memory=memory)
     tick("the next experiment")
     proposal, why = None, ""
     try:
@@ -103,7 +108,7 @@ def _values(m: Material, command: Mapping[str, str]) -> dict[str, Any]:
         "causes": causes,
         "certainty": certainty(d),
         "numbers": numbers_in_words(d.selection.fit, d.effects, d.numbers) if d.selection is not None else [],
-        "moments": d.behaviour[: len(d.behaviour) - len(d.terms_in_words)],
+        "moments": d.moments,
         "terms": _terms(d),
         "improvement": tables.improvement_text(d),
         "competing_models": _competing_models(m),
@@ -137,6 +142,8 @@ def _values(m: Material, command: Mapping[str, str]) -> dict[str, Any]:
 
 def _terms(d: Diagnosis) -> list[dict[str, str]]:
     """What no effect explains, in words and as formulas that can be added; where there is none, a formula that was found."""
+    if d.terms_raise_the_error:
+        return []
     terms = d.terms or ((d.formula,) if d.formula else ())
     words = d.terms_in_words or (d.formula_in_words or "A formula was found that explains a part of it",) * len(terms)
     return [

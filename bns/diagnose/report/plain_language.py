@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.report.people import unit_for_people
 from bns.diagnose.report.sized import sized_sentence
 from bns.diagnose.select.known_effects import known_effects
+from bns.diagnose.select.result import SelectionResult
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import numbers_of, without_width
 
@@ -70,25 +71,43 @@ def numbers_in_words(
 
 
 def headline(d: Diagnosis) -> str:
-    """The verdict in one sentence or two."""
+    """The verdict in a few sentences."""
     numbers = d.numbers
     said = _all_of(d, d.effects, numbers)
     if d.selection is not None and (d.verdict == "tie" or (d.verdict == "unlisted" and d.selection.competing_models)):
-        explanations = (d.selection.accepted, *d.selection.competing_models)
-        shared = tuple(name for name in explanations[0] if all(name in names for names in explanations))
-        causes = [_all_of(d, tuple(n for n in names if n not in shared)) or "nothing else" for names in explanations]
-        some = causes[:_CAUSES] + (["something else"] if len(causes) > _CAUSES else [])
-        either = f"{_all_of(d, shared, numbers)}; and either" if shared else "either"
-        rest = f"; and also {_UNKNOWN}" if d.verdict == "unlisted" else ""
-        return f"Missing from the model: {either} {', or '.join(some)}{rest}. These measurements cannot decide which."
+        return " ".join(_alternatives(d, d.selection, numbers))
     return {
         "none": "Nothing is missing from the model that these measurements could show.",
         "effects": f"Missing from the model: {said}.",
-        "unlisted": f"Missing from the model: {said}, and {_UNKNOWN}."
+        "unlisted": f"Missing from the model: {_joined([*_each_of(d, d.effects, numbers), _UNKNOWN])}."
         if said
         else "Something is missing from the model that none of the known effects explains.",
         "insufficient-data": "These measurements do not suffice to say whether anything is missing.",
     }[d.verdict]
+
+
+def _alternatives(
+    d: Diagnosis, selection: SelectionResult, numbers: Mapping[str, Mapping[str, Mapping[str, Any]]]
+) -> Iterator[str]:
+    """What all explanations share, what each has beside that, and what none explains."""
+    explanations = (selection.accepted, *selection.competing_models)
+    shared = tuple(name for name in explanations[0] if all(name in names for names in explanations))
+    own = [tuple(name for name in names if name not in shared) for names in explanations]
+    causes = [_together(_each_of(d, names, None)) for names in own if names]
+    some = causes[:_CAUSES] + (["something else"] if len(causes) > _CAUSES else [])
+    if shared:
+        yield f"Missing from the model: {_all_of(d, shared, numbers)}."
+    also = "also missing" if shared else "missing from the model"
+    begun = f"{also.capitalize()}: either" if len(causes) == len(own) else f"Perhaps {also}:"  # one explanation may do without
+    yield f"{begun} {'; or '.join(some)}."
+    yield f"These measurements cannot decide{' which' if len(causes) > 1 else ''}."
+    if d.verdict == "unlisted":
+        yield f"And {_UNKNOWN} is missing as well."
+
+
+def _together(said: Sequence[str]) -> str:
+    """Clauses that make one explanation, among others that are set apart by semicolons."""
+    return ", and at the same time ".join(said)
 
 
 def head_of_page(d: Diagnosis) -> tuple[str, list[str]]:
@@ -96,13 +115,13 @@ def head_of_page(d: Diagnosis) -> tuple[str, list[str]]:
     tied = d.selection is not None and bool(d.selection.competing_models)
     if d.verdict not in {"effects", "unlisted"} or tied or len(d.effects) < _LISTED:
         return headline(d), []
-    rest = f", and {_UNKNOWN}" if d.verdict == "unlisted" else ""
+    rest = f" and {_UNKNOWN}" if d.verdict == "unlisted" else ""
     return f"Missing from the model: {len(d.effects)} effects{rest}.", _each_of(d, d.effects, d.numbers)
 
 
 def with_what(d: Diagnosis) -> str:
     """The extended model, as the beginning of a sentence that follows the headline."""
-    if d.verdict == "tie":
+    if d.verdict == "tie" or (d.selection is not None and d.selection.competing_models):
         return "With the first of these explanations"
     return "With it" if len(d.effects) == 1 else "With them"
 
@@ -118,8 +137,12 @@ def further_notes(d: Diagnosis, formula: bool = False) -> list[str]:
 
 def _all_of(d: Diagnosis, names: tuple[str, ...], numbers: Mapping[str, Mapping[str, Mapping[str, Any]]] | None = None) -> str:
     """What happens where these effects are at work, in everyday words; how much, where ``numbers`` has it."""
-    said = _each_of(d, names, numbers)
-    return " and ".join(said) if len(said) < _LISTED else f"{'; '.join(said[:-1])}; and {said[-1]}"
+    return _joined(_each_of(d, names, numbers))
+
+
+def _joined(said: Sequence[str]) -> str:
+    """Whole clauses, which have commas and "and" of their own."""
+    return "; and ".join(filter(None, ("; ".join(said[:-1]), *said[-1:])))
 
 
 def _each_of(d: Diagnosis, names: tuple[str, ...], numbers: Mapping[str, Mapping[str, Mapping[str, Any]]] | None) -> list[str]:
@@ -142,7 +165,7 @@ def certainty(d: Diagnosis) -> str:
         )
     if d.verdict == "unlisted":
         left = next((n for n in d.notes if n.startswith(("Left unexplained", "The unexplained motion"))), "")
-        with_effects = "with all listed effects" if d.effects else "as given"
+        with_effects = "as given" if not d.effects else "with this effect" if len(d.effects) == 1 else "with these effects"
         return (
             f"Over {trials} trials, predictions of the model {with_effects} are wrong in a pattern that chance does not explain. "
             f"{left}"

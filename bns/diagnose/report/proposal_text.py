@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bns.diagnose.design.proposal import ModelPair, Proposal
+from bns.diagnose.select.indistinguishable import TIE_Z
 from bns.robots.khepera import START
 
 _NEEDLESS = (
@@ -34,6 +35,12 @@ def model_pair_text(c: ModelPair) -> str:
         return f"{pair}: no sequence of commands tells them apart." + (
             f" Another measurement can: {other}." if other else ""
         )
+    if c.no_decision:
+        return (
+            f"{pair}: no decision is expected from so short an experiment: the difference is expected to be "
+            f"{c.standard_errors:.1f} standard errors, and it takes {TIE_Z:g} to decide. For a probability of 90 % it takes "
+            f"{_minutes(c.minutes)} of driving (--minutes)."
+        )
     if c.already_decided:
         return f"{pair}: decided by these measurements already; {_minutes(c.minutes)} of new driving alone would also decide."
     beside = f" (random commands: {c.times_faster:.1f} times as long)" if c.times_faster > 1 else ""
@@ -44,6 +51,8 @@ def proposal_lines(p: Proposal) -> list[str]:
     """Whether an experiment is needed at all, a sentence a pair, then what the trials are."""
     lines = [_NEEDLESS] * _needless(p) + [model_pair_text(c) for c in p.model_pairs]
     if not len(p.plan):
+        if any(c.no_decision for c in p.model_pairs):
+            return [*lines, f"No trial is proposed: none is expected to decide in {p.minutes:g} min."]
         return [*lines, "No trial is proposed: no commands would decide."]
     a = p.arena
     if a is None or p.bounds is None:

@@ -14,7 +14,7 @@ from bns.diagnose.data.load import Measured
 from bns.diagnose.design.proposal import Proposal
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.predict.horizons import IN_WORDS
-from bns.diagnose.predict.paired_errors import HorizonErrors, ModelError
+from bns.diagnose.predict.paired_errors import Change, ModelError
 from bns.diagnose.report.plain_language import figures_in_words, with_what
 from bns.diagnose.values import numbers_of
 
@@ -27,20 +27,27 @@ def ahead(horizon: str) -> str:
 
 
 def error_table(d: Diagnosis, c: Comparison | None) -> Table | None:
-    """Error at every horizon, before and after, beside the noise of the tracking."""
+    """Error at every horizon, before and after, beside the noise of the tracking.
+
+    The change leads from the model as given to the last one that is accepted: terms that raise the error are not.
+    """
     errors = d.errors_with_terms or d.errors or (c.judged if c is not None else None)
     if errors is None:
         return None
     shown = [e for e in errors.horizons.values() if e.windows]
     models = ["as given (mm)"]
     models += ["with the effects (mm)"] if d.effects else []
-    models += ["with what is left described, too (mm)"] if d.errors_with_terms is not None else []
-    changes = ["change, 95 % (mm)"] if len(models) > 1 else []
+    accepted = len(models)
+    if d.errors_with_terms is not None:
+        rejected = d.terms_raise_the_error
+        models += ["with a term that was rejected (mm)" if rejected else "with what is left described, too (mm)"]
+        accepted += not rejected
+    changes = ["change, 95 % (mm)"] if accepted > 1 else []
     rows = [
         [
             ahead(e.horizon),
             *(_both(e.models[0 if index == 0 else index - len(models)]) for index in range(len(models))),
-            *(_interval(e) for _ in changes),
+            *(_interval(e.total if accepted == len(e.models) else e.changes[0]) for _ in changes),
             _mm(e.noise_floor_m),
             str(e.windows),
         ]
@@ -53,8 +60,7 @@ def _both(m: ModelError) -> str:
     return f"{_mm(m.rms_m)} (median {_mm(m.median_m)})"
 
 
-def _interval(e: HorizonErrors) -> str:
-    change = e.total
+def _interval(change: Change | None) -> str:
     if change is None or not np.isfinite(change.low_m):
         return "too few trials"
     return f"{1e3 * change.low_m:+.2f} to {1e3 * change.high_m:+.2f}"

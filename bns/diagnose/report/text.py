@@ -29,7 +29,7 @@ from bns.physics.effect import Effect
 _VERDICTS = {
     "none": "Nothing is missing that these measurements could show.",
     "effects": "Missing from the model: {effects}.",
-    "tie": "Missing from the model: {effects}, or an alternative that these measurements cannot tell from it.",
+    "tie": "Missing from the model: {effects}, or an alternative that these measurements cannot tell from {them}.",
     "unlisted": "Something is missing that no listed effect explains.",
     "insufficient-data": "These measurements do not suffice for a verdict.",
 }
@@ -66,7 +66,8 @@ def _diagnosis(d: Diagnosis, rivals: Sequence[Rival], command: Mapping[str, str]
     if d.verdict == "unlisted" and d.effects:
         yield f"Missing from the model: {_named(d)}, and something that no listed effect explains."
     else:
-        yield _VERDICTS[d.verdict].format(effects=enumerated(d.effects) or "nothing listed")
+        them = "it" if len(d.effects) == 1 else "them"
+        yield _VERDICTS[d.verdict].format(effects=enumerated(d.effects) or "nothing listed", them=them)
     odd = [implausible_text(d.selection, name) for name in d.selection.implausible] if d.selection is not None else []
     yield from odd
     if d.selection is not None:
@@ -146,15 +147,16 @@ def _behaviour(d: Diagnosis) -> Iterator[str]:
 
 def _terms(d: Diagnosis) -> Iterator[str]:
     """The terms as formulas; of a long one, where it is written."""
+    begun = "rejected" if d.terms_raise_the_error else "candidate"
     for term in d.terms:
         numbers = numbers_of_term(term)
         if len(term.term) <= _WIDTH:
-            yield f"\ncandidate term {term.name}, added to {term.on}: {term.term}"
+            yield f"\n{begun} term {term.name}, added to {term.on}: {term.term}"
             yield from _intervals({term.name: numbers})
             continue
         written = "" if d.terms_raise_the_error else " and in the model that -o FILE writes"
         yield (
-            f"\ncandidate term {term.name} ({term.signal}), added to {term.on}: {len(numbers)} numbers; the formula is in the "
+            f"\n{begun} term {term.name} ({term.signal}), added to {term.on}: {len(numbers)} numbers; the formula is in the "
             f"output of --json{written}"
         )
 
@@ -256,10 +258,12 @@ def _ranking(d: Diagnosis) -> Iterator[str]:
         rejected = f"not considered: {c.rejected_because}" if c.rejected_because else ""
         e = c.paired_comparison
         yield f"  {c.name:20}{e.elpd_diff:10.3f}{e.dse:10.3f}{e.p_value:10.2g}  {rejected}".rstrip()
+    if any(c.rejected_because for c in d.selection.steps[0].ranking[:_SHOWN]):
+        yield "  (not considered: alone, it fits only with a number that no robot has, or that these data leave open)"
     ranked = [c.name for c in d.selection.steps[0].ranking]
     later = [name for name in d.effects if name not in ranked]
     if later:
-        yield f"  (not fitted alone in this round, though found: {', '.join(later)})"
+        yield f"  (not tried alone, but found later in the search: {', '.join(later)})"
     yield f"  (gain of the best of {len(DECOYS)} decoys: {d.selection.steps[0].decoy_threshold:.3f})"
 
 

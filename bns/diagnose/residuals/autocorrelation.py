@@ -1,4 +1,4 @@
-"""What repeats itself along time, though no variable shows it: a wheel out of round, a heading that wanders.
+"""What has a rhythm along time, though no variable shows it: a wheel out of round, a heading that wanders.
 
 Foreseen well, frames are independent. Honest motors are a little faster or slower from one command to the next, and from
 trial to trial; that is taken out first, so that it does not look like an autocorrelation: inside commands each command's mean,
@@ -13,14 +13,14 @@ more than stationary errors can make it.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bns.diagnose.data.tracking_noise import robust_sd
+from bns.diagnose.data.robust import robust_sd
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.residuals.unforeseen import unforeseen
@@ -35,18 +35,38 @@ APART = DEFAULTS.residuals.ways_apart
 MOVES_Z = DEFAULTS.residuals.moves_z
 MEMORY = DEFAULTS.residuals.tracker_memory
 _CLIP = DEFAULTS.residuals.clip
+LONGEST = DEFAULTS.residuals.longest_period_frames
 _DIRECTIONS = ("forward", "left", "heading")
+_WORDS = {"forward": "forwards", "left": "sideways", "heading": "in heading"}
 
 
 @dataclass(frozen=True)
 class Autocorrelation:
-    """Correlation of the unforeseen with itself ``lag`` frames (``within`` commands) or commands (``between`` them) before."""
+    """Correlation of the unforeseen with itself ``lag`` frames (``within`` commands) or commands (``between`` them) before.
+
+    ``period_s``: of an oscillation, where the correlations at all lags show one; else None.
+    """
 
     direction: str
     scale: str
     lag: int
     correlation: float
     z: float
+    period_s: float | None = None
+
+    @property
+    def in_words(self) -> str:
+        """What it says of the motion, in a sentence. What is opposed a while later swings back; it does not repeat itself."""
+        motion = f"The unexplained motion {_WORDS.get(self.direction, self.direction)}"
+        after = f"{self.lag} frames later" if self.scale == "within" else "in the next command"
+        seen = f"correlation {self.correlation:+.2f}"
+        if self.period_s is not None:
+            swings = f"swings to and fro with a period of about {self.period_s:.2g} s, {1 / self.period_s:.2g} Hz"
+            cause = "something oscillates that no logged variable shows, such as a marker that sways"
+            return f"{motion} {swings} ({seen} {after}): {cause}."
+        if self.correlation < 0:
+            return f"{motion} is opposite {after} ({seen}): something swings back that no logged variable shows."
+        return f"{motion} is alike {after} ({seen}): something oscillates or drifts that no logged variable shows."
 
     @property
     def significant(self) -> bool:
@@ -65,7 +85,38 @@ def autocorrelations(problem: Problem, fit: Fit) -> list[Autocorrelation]:
         within = [_pooled(direction, "within", lag, [_within(commands, lag) for commands in trials]) for lag in LAGS]
         found += [r for r in within if not r.significant or _moves(moved(), index, r)]
         found.append(_pooled(direction, "between", 1, [_between(commands) for commands in trials]))
-    return sorted(found, key=lambda r: (not r.significant, -abs(r.z)))
+    largest, *others = sorted(found, key=lambda r: (not r.significant, -abs(r.z)))
+    if largest.significant and largest.scale == "within":
+        trials = list(_by_command(problem, fit, _DIRECTIONS.index(largest.direction)))
+        frames = _period([_pooled("", "", lag, [_within(commands, lag) for commands in trials]) for lag in range(1, LONGEST + 1)])
+        tracks = problem.predictor.tracks
+        frame_s = float(np.median(np.diff(tracks.t_s)[~tracks.is_first[1:]]))
+        largest = replace(largest, period_s=None if frames is None else frames * frame_s)
+    return [largest, *others]
+
+
+def _period(correlogram: list[Autocorrelation]) -> float | None:
+    """Frames of an oscillation's period, from the correlations at the lags 1, 2, …: half of it later what moves is opposed, and
+    after the whole it is alike again, both beyond chance. None where that is not so."""
+    r, z = (np.array([getattr(one, name) for one in correlogram]) for name in ("correlation", "z"))
+    if not (z < -LEAST_Z).any():
+        return None
+    first = int((z < -LEAST_Z).argmax())
+    ends = np.append(np.flatnonzero(r[first:] >= 0) + first, len(r))[0]
+    half = first + int(r[first:ends].argmin()) + 1
+    lags = np.arange(half + (half + 1) // 2, min(half * 5 // 2, len(r)) + 1)
+    if not len(lags):
+        return None
+    whole = int(lags[r[lags - 1].argmax()])
+    inside = lags[0] < whole < lags[-1]
+    return _summit(r, whole) if inside and z[whole - 1] > LEAST_Z else None
+
+
+def _summit(values: Array, lag: int) -> float:
+    """Where the parabola through three correlations is highest, in lags; ``values`` begin at the lag 1."""
+    before, at, after = values[lag - 2 : lag + 1]
+    bend = before - 2 * at + after
+    return lag + 0.5 * float((before - after) / bend) if bend < 0 else float(lag)
 
 
 def _unforeseen_ways(problem: Problem, fit: Fit) -> list[Array]:

@@ -3,8 +3,9 @@
 Each change of command is shifted a little, which shows along which direction the innovations after it answer; how far they lie
 in that direction says how late this one command was. A delay, a lag, or a limit that the model lacks makes all of them late, by
 times that depend on the change (how large it is, of which wheel, whether it is a turn, reverses or stops, how soon it follows):
-that is taken out. What is left is compared with the same direction later in the same command, where nothing changes: errors of
-a tracker and of the model are as large there.
+that is taken out, and where mostly the large changes are late, their size is the cause and nothing scatters. What is left is
+compared with the same direction later in the same command, where nothing changes: errors of a tracker and of the model are as
+large there.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ WINDOW_S = DEFAULTS.residuals.command_window_s
 FARTHEST_S, SHIFTS = DEFAULTS.residuals.command_shifts
 FEWEST = DEFAULTS.residuals.command_fewest
 TIMES_USUAL = DEFAULTS.residuals.command_times_usual
+SMALLER, ALIKE = DEFAULTS.residuals.command_sizes_alike
 WELL_KNOWN = DEFAULTS.residuals.command_well_known
 
 
@@ -140,7 +142,24 @@ def _scattered(
     noise = float(np.nanmean((usual / root_of) ** 2))
     if float(np.mean(apart**2)) < TIMES_USUAL * max(noise, 1.0):
         return None
+    if _of_large_steps(apart**2 - noise, known[clear], np.array([c.kind[1] for c in changes])[clear]):
+        return None
     return [c for c, good in zip(changes, clear, strict=True) if good]
+
+
+def _of_large_steps(excess: Array, known: Array, size: Array) -> bool:
+    """Are the changes that are late or early mostly the large ones? A packet is lost whatever it says: all sizes scatter alike.
+
+    ``excess`` (changes,): square of the deviation beyond noise; ``known`` (1/s2): what a square of a second makes of it;
+    ``size`` of the change (m/s). Motors that are cut, or a controller that trips, do so beyond some size.
+    """
+    for share in SMALLER:
+        large = size > np.quantile(size, share)
+        if large.any():
+            smaller, larger = (float(excess[some].sum() / known[some].sum()) for some in (~large, large))
+            if smaller < ALIKE * larger:
+                return True
+    return False
 
 
 def _delays(problem: Problem, fit: Fit, predictor: WheelPredictor, changes: Sequence[_Change]) -> Array:

@@ -100,11 +100,12 @@ def established(
     response: bool | None = None,
     known: Model | None = None,
     past: bool = True,
+    others: Mapping[str, Effect] | None = None,
 ) -> Established:
     """The search with flexible terms; ``accepted``: the effects that a search without them ended in, ``known``: with its numbers.
 
     ``response``: is the wheels' free response a candidate; by default where no effect was accepted. ``past``: is any answer to
-    past commands.
+    past commands. ``others``: effects that were not accepted; what hid them may be in a term.
     """
     problem = problem_for(predictor, given)
     state, left = _State(problem, problem.fit(given), known=known), dict(accepted)
@@ -112,7 +113,7 @@ def established(
     grammar = grammar if past else [family for family in grammar if family.signal not in PAST]
     level = FALSE_ALARM / max(len(left) + len(grammar), 1)
     for _ in range(len(accepted) + TERMS):
-        following = _step(predictor, state, left, grammar, level)
+        following = _step(predictor, state, left, grammar, level, others or {})
         if following is None:
             break
         state = following
@@ -166,9 +167,18 @@ def _better_term(
 
 
 def _step(
-    predictor: Predictor, state: _State, left: Mapping[str, Effect], grammar: Sequence[Family], level: float
+    predictor: Predictor,
+    state: _State,
+    left: Mapping[str, Effect],
+    grammar: Sequence[Family],
+    level: float,
+    others: Mapping[str, Effect],
 ) -> _State | None:
-    """The best effect or term added; None where neither earns anything."""
+    """The best effect or term added; None where neither earns anything.
+
+    Beside one term no second one comes in where one of the ``others`` predicts as well with fewer numbers and leaves nothing
+    unexplained: the first term had hidden it. Where more is left, an effect would imitate what the terms fail to describe.
+    """
     problem, fit = state.problem, state.fit
     tried = _tried(problem, fit, left, state.known)
     earned = {name: one for name, one in tried.items() if _earns(problem.paired_comparison(fit, one), fit, level)}
@@ -176,10 +186,31 @@ def _step(
     curves = _curves(problem, fit, grammar, state.terms)
     term = _better_term(problem, fit, curves, earned.get(best), level)
     if term is not None:
+        name, added = _in_its_place(problem, fit, term, others) if len(state.terms) == 1 else ("", fit)
+        with_effect = replace(state.settled(predictor, added), names=(*state.names, name)) if name else None
+        if with_effect is not None and not _leaves_something(with_effect.problem, with_effect.fit):
+            return with_effect
         return replace(state.settled(predictor, term.fit), terms=(*state.terms, term))
     if not best:
         return None
     return replace(state.settled(predictor, earned[best]), names=(*state.names, best))
+
+
+def _in_its_place(problem: Problem, fit: Fit, term: Formula, others: Mapping[str, Effect]) -> tuple[str, Fit]:
+    """The effect that has fewer numbers than a term and predicts trials held out as well, and its fit; "" if none does."""
+    level = FALSE_ALARM / max(len(others), 1)
+    known = {active.effect.name for active in fit.model.effects}
+    tried = _tried(problem, fit, {name: effect for name, effect in others.items() if name not in known}, None)
+    as_good = {
+        name: one
+        for name, one in tried.items()
+        if len(one.free) < len(term.fit.free)
+        and float(one.held_out.sum()) <= float(term.fit.held_out.sum())
+        and not implausible(one, name)
+        and _earns(problem.paired_comparison(fit, one), fit, level)
+    }
+    best = min(as_good, key=lambda name: float(as_good[name].held_out.sum()), default="")
+    return best, as_good.get(best, fit)
 
 
 def _tried(problem: Problem, fit: Fit, effects: Mapping[str, Effect], known: Model | None) -> dict[str, Fit]:

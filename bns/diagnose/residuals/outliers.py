@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from bns.diagnose.data.tracking_noise import robust_sd
+from bns.diagnose.data.robust import robust_sd
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.residuals.unforeseen import unforeseen_way, ways
@@ -67,20 +67,37 @@ class Outlier:
         )
 
 
-def outliers(problem: Problem, fit: Fit) -> list[Outlier]:
-    """One for every trial with a window that stands out, the worst first; none where fewer than `TRIALS` have one."""
-    tracks = problem.predictor.tracks
-    start = _windows(tracks.first)
+@dataclass(frozen=True)
+class JudgedWindows:
+    """Windows that do not overlap and are near no jump of the tracker: the frame after which each begins, how far off each is
+    (robust standard deviations), and whether it stands out; (windows,) each."""
+
+    start: NDArray[np.int64]
+    size: Array
+    stands_out: NDArray[np.bool_]
+
+
+def judged_windows(problem: Problem, fit: Fit) -> JudgedWindows:
+    """All windows of these tracks under a fitted model."""
+    start = _windows(problem.predictor.tracks.first)
     start = start[~_near(_jumped(problem, fit), start)]
     if not len(start):
-        return []
+        return JudgedWindows(start, np.zeros(0), np.zeros(0, dtype=bool))
     whitened = np.clip(fit.whitened, -_CLIP, _CLIP)
     sums = whitened[start[:, None] + np.arange(WIDTH)].sum(axis=1) / np.sqrt(WIDTH)
     usual = robust_sd(sums, axis=0)
     size = np.abs(sums / np.maximum(usual, 1e-9)).max(axis=1)
-    moved = _moved(problem, fit, start)
-    order = [i for i in np.argsort(-size) if size[i] > FAR and moved[i] > MOVED]
-    worst = {int(tracks.trial[start[i]]): i for i in reversed(order)}
+    return JudgedWindows(start, size, (size > FAR) & (_moved(problem, fit, start) > MOVED))
+
+
+def outliers(problem: Problem, fit: Fit, judged: JudgedWindows | None = None) -> list[Outlier]:
+    """One for every trial with a window that stands out, the worst first; none where fewer than `TRIALS` have one.
+
+    ``judged``: what `judged_windows` gave, where that is known.
+    """
+    tracks, judged = problem.predictor.tracks, judged or judged_windows(problem, fit)
+    start, size = judged.start, judged.size
+    worst = {int(tracks.trial[start[i]]): i for i in np.argsort(size) if judged.stands_out[i]}
     if len(worst) < TRIALS:
         return []
     found = [moment_at(problem, fit, int(start[i]), float(size[i])) for i in worst.values()]

@@ -12,7 +12,8 @@ from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.residuals.along_variables import ResidualDependence, significant_dependence
 from bns.diagnose.residuals.autocorrelation import Autocorrelation, autocorrelations
 from bns.diagnose.residuals.command_times import CommandTimes, command_times
-from bns.diagnose.residuals.outliers import Outlier, outliers
+from bns.diagnose.residuals.moments_share import SharedCause, shared_cause
+from bns.diagnose.residuals.outliers import Outlier, judged_windows, outliers
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,8 @@ class Unexplained:
     outliers: tuple[Outlier, ...]
     command_times: CommandTimes | None = None
     """The scatter of the times at which commands take effect: no model predicts it."""
+    shared: SharedCause | None = None
+    """What the changes of command share that such moments follow."""
 
     @property
     def any(self) -> bool:
@@ -37,10 +40,12 @@ NOTHING = Unexplained((), None, ())
 
 def unexplained(problem: Problem, fit: Fit, seen: Sequence[ResidualDependence]) -> Unexplained:
     """Of the patterns ``seen`` in a fitted model, and of its innovations, what is too large and too certain to be luck."""
-    largest = autocorrelations(problem, fit)[0]
+    largest, windows = autocorrelations(problem, fit)[0], judged_windows(problem, fit)
+    moments = tuple(outliers(problem, fit, windows))
     return Unexplained(
         tuple(significant_dependence(list(seen))),
         largest if largest.significant else None,
-        tuple(outliers(problem, fit)),
+        moments,
         command_times(problem, fit),
+        shared_cause(problem, windows) if moments else None,
     )

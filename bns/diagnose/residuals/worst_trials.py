@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bns.diagnose.data.tracking_noise import robust_sd
+from bns.diagnose.data.robust import robust_sd
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.noise import huber
 from bns.diagnose.residuals.outliers import WIDTH, Outlier, moment_at

@@ -6,10 +6,11 @@ import math
 from dataclasses import dataclass
 
 from bns.diagnose.settings.setting import BY_HAND, setting
+from bns.diagnose.settings.stamps import Stamps
 
 
 @dataclass(frozen=True)
-class Data:
+class Data(Stamps):
     """``data/``: checks of tables, division of a log into trials, tracks, tracker faults, tracking noise."""
 
     held_share: float = setting(
@@ -208,6 +209,13 @@ class Data:
         "A log without trials is proposed to be cut where the robot is told to stand for so long (the first number), else at "
         f"gaps longer than the second one, else into pieces that last the third one; {BY_HAND}.",
     )
+    guess_clear_gaps: tuple[float, float] = setting(
+        (3.0, 0.25),
+        "1",
+        "Gaps in a log are clear, and it is proposed to be cut at them, if the shortest is so many times (the first number) "
+        "as long as any other time between rows, and if there are at least so many of them (the second one) for each time that "
+        f"the robot stands: a tracker that failed once cuts no log; {BY_HAND}.",
+    )
     guess_degrees: float = setting(
         90.0,
         "number",
@@ -323,7 +331,32 @@ class Data:
     settled_s: float = setting(
         0.5,
         "s",
-        "This long after a stop command, the robot is taken to stand: ten times the lag of a small robot's motors.",
+        "A robot that is told to stand is not taken to rest before this time: ten times the lag of a small robot's motors. One "
+        "that coasts for longer shows it (`rest_goes_on`).",
+    )
+    rest_goes_on: float = setting(
+        3.0,
+        "1",
+        "The first part of a rest is left out if the robot is further along its way after it by more than this many times what "
+        "noise does, which goes back as often. Of 1000 normal numbers 1.3 are larger. Simulated at 25 Hz: where nothing coasts "
+        "this lowers the noise by less than 1 %, by up to 4 % where it is slow wander alone (0.95 from pose to pose, six rests); "
+        "robots that coast raise it by up to 10 %, that of the heading by 44 % with a lag of 0.4 s, quick spins and rests of 1 "
+        "to 2 s (by 10 to 1400 % where all poses of a rest count).",
+    )
+    rest_parts: int = setting(
+        3,
+        "parts",
+        "The first of so many equal parts of a rest is compared with the others, and left out at once: three comparisons "
+        f"shorten a rest of two seconds to 0.6 s; {BY_HAND}.",
+    )
+    rest_fewest_left: int = setting(
+        9,
+        "poses",
+        "A rest whose begin was left out counts only if so many poses remain: in fewer, a robot that still coasts cannot be told "
+        "from noise. With 5, a lag of 0.4 s before rests of 0.8 to 1.3 s raised the noise by 32 % (simulated).",
+    )
+    rest_least: float = setting(
+        1e-6, "m, rad", "Smaller motion is rounding of the log: the noise of any tracker is a hundred times as large."
     )
     fewest_at_rest: int = setting(
         30,

@@ -88,6 +88,19 @@ class Design:
     longest_minutes: float = setting(
         24 * 60.0, "min", f"Robot time (a day) beyond which no experiment is taken to separate a pair; {BY_HAND}."
     )
+    alike_rms: float = setting(
+        0.01,
+        "standard deviations",
+        "Explanations whose predictions differ by less than this fraction of the noise (root mean square over the most telling "
+        "commands, after each has adjusted its numbers) agree for every command. At 25 poses a second it would take an hour to "
+        f"tell them apart, and no robot repeats itself so exactly; {BY_HAND}.",
+    )
+    least_standard_errors: float = setting(
+        1.0,
+        "standard errors",
+        "Trials that are expected to show a smaller difference are not proposed: the diagnosis asks for `tie_z`, which they "
+        f"would show once in six times; {BY_HAND}.",
+    )
     most_faster: float = setting(100.0, "1", f"Larger ratios are not reported; {BY_HAND}.")
     dense: float = setting(
         3.0, "poses", f"From this many poses per command on, they count as a track at the camera's rate; {BY_HAND}."

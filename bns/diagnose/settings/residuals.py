@@ -61,6 +61,11 @@ class Residuals:
         "Displacements that are compared are at least this far apart, as in `lags`: neighbouring frames share "
         "errors of the camera.",
     )
+    longest_period_frames: int = setting(
+        50,
+        "frames",
+        f"An oscillation is looked for up to this period, 2 s at 25 Hz: few commands last much longer; {BY_HAND}.",
+    )
     moves_z: float = setting(
         2.0,
         "standard errors",
@@ -146,10 +151,10 @@ class Residuals:
         (3.0, 40.0), "steps", f"Range of the number of steps into which the highest speed may be divided; {BY_HAND}."
     )
     speed_knots: tuple[float, ...] = setting(
-        (0.0, 0.04, 0.1, 0.2, 0.35, 0.6, 1.0),
+        (0.0, 0.04, 0.1, 0.2, 0.35, 0.55, 0.75, 1.0),
         "of the fastest speed",
         "Knots of a free curve along a wheel's own speed, denser at low speed, where friction acts; the curve is "
-        "zero at rest.",
+        "zero at rest. With one knot fewer at high speed a driver's exponential curve of 15 % was off by 1.8 % at full speed.",
     )
     session_knots: tuple[float, ...] = setting(
         (0.0, 0.01, 0.03, 0.07, 0.15, 0.35, 0.65, 1.0),
@@ -233,6 +238,14 @@ class Residuals:
         "Variance of the commands' delays, over what the same direction shows later in the commands, from which their scatter is "
         "certain. Logs of simulated robots with other faults have at most 3, with commands that are polled or lost 12 to 20.",
     )
+    command_sizes_alike: tuple[tuple[float, ...], float] = setting(
+        ((0.33, 0.5, 0.67, 0.8), 0.4),
+        "of the changes, 1",
+        "Commands scatter where the variance of the delays (s2) of the smaller changes is at least the second number times that "
+        "of the larger ones, wherever the two are parted: each number of the first list is a share of smaller changes. Motors "
+        "that were cut for 0.2 s after a large step (another author's simulator, two logs) left 0.12 and 0.18, commands late by "
+        "chance 0.6 to 1.4 (seven simulated logs).",
+    )
     floor_side: int = setting(
         4, "bumps", f"Basis functions per side of a field over the floor that is written as a formula; {BY_HAND}."
     )
@@ -260,6 +273,21 @@ class Residuals:
         "trials",
         "At least this many trials must have such a window: a single push against the robot says nothing of its "
         "model.",
+    )
+    share_fewest: int = setting(
+        8,
+        "changes",
+        "So many changes of command at least must be followed by a moment that stands out, and so many by none, before the tool "
+        "says what the first ones share: fewer could share one of many properties by chance.",
+    )
+    share_pure: float = setting(
+        0.8,
+        "1",
+        "At least this fraction of the changes of command beyond the limit must be followed by such a moment, and at least this "
+        "fraction of such moments must follow one beyond it. Two robots of another hand whose motors stop for 0.2 s after large "
+        "steps had 0.90 and 0.88; of robots of that hand with a lag, a delay, a limit of speed, a marker that sways, steps that "
+        "are ignored and motors that tire, asked without these effects, the largest was 0.77. With an acceleration limit it was "
+        "0.87: large steps are what it acts on.",
     )
     worst_share: float = setting(
         0.03,

@@ -12,11 +12,15 @@ from bns.registry import JOINT_EFFECTS
 
 Links = tuple[tuple[str, int], ...]
 """Links: their names and numbers."""
+Joints = tuple[tuple[str, bool], ...]
+"""Joints with a servo: their names, and whether its torque is limited."""
+Sites = tuple[tuple[str, bool], ...]
+"""Tracked sites: their names, and whether a load may be fixed there."""
 
 
 @lru_cache(maxsize=32)
 def catalogue(
-    joints: tuple[str, ...], sites: tuple[str, ...], links: Links, on_floor: Links, free: bool
+    joints: Joints, sites: Sites, links: Links, on_floor: Links, free: bool
 ) -> dict[str, Effect]:
     """Name -> effect of a body with these joints, tracked sites and links; what the floor does only to one that lies on it.
 
@@ -34,15 +38,15 @@ OF_THE_FLOOR = ("floor-friction", "friction-anisotropy", "floor-slope", "floor-p
 
 def _members(
     part: Effect | PerJoint | PerSite | PerLink,
-    joints: tuple[str, ...],
-    sites: tuple[str, ...],
+    joints: Joints,
+    sites: Sites,
     links: Links,
     on_floor: Links,
 ) -> Iterator[Effect]:
     if isinstance(part, PerJoint):
-        yield from (part.of(joint) for joint in joints)
+        yield from (part.of(joint) for joint, limited in joints if limited or not part.limited)
     elif isinstance(part, PerSite):
-        yield from (part.of(site, number) for number, site in enumerate(sites))
+        yield from (part.of(site, at) for at, (site, may) in enumerate(sites) if may or not part.carries)
     elif isinstance(part, PerLink):
         yield from (part.of(*link) for link in (on_floor if part.on_floor else links))
     else:

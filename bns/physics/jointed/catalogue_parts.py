@@ -45,21 +45,28 @@ class _Placed:
             self.effect,
             name=f"{self.effect.name}-{name}",
             apply=partial(self.effect.apply, **place),
+            extends=self.effect.extends and f"{self.effect.extends}-{name}",
             sentence=self.effect.sentence.format(**words),
             measurement=self.effect.measurement.format(**words),
         )
 
 
+@dataclass(frozen=True)
 class PerJoint(_Placed):
-    """One for every joint with a servo."""
+    """One for every joint with a servo, or for every one whose servo has a torque limit."""
+
+    limited: bool = False
 
     def of(self, joint: str) -> Effect:
         """The effect at that joint."""
         return self._at(joint, {"joint": joint}, {"joint": joint})
 
 
+@dataclass(frozen=True)
 class PerSite(_Placed):
-    """One for every tracked point."""
+    """One for every tracked point, or for every one to which a load may be fixed."""
+
+    carries: bool = False
 
     def of(self, site: str, number: int) -> Effect:
         """The effect at that point, the ``number``-th."""

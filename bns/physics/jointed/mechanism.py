@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from bns.errors import ModelError, unknown_name
 from bns.extras import deferred
+from bns.physics.jointed.payload import carry
 from bns.physics.jointed.plant import Plant, sound
 
 mujoco = deferred("snake", "mujoco")
@@ -81,6 +82,25 @@ class Machine:
         """Those that have mass: name, and number among the links."""
         return tuple((self._name(link), link) for link in np.flatnonzero(self.model.body_mass[1:] > 0).tolist())
 
+    @property
+    def limited(self) -> tuple[tuple[str, bool], ...]:
+        """Joints with a servo: name, and whether the servo's torque has a limit."""
+        return tuple(zip(self.joints, np.isfinite(self.torque_n_m).tolist(), strict=True))
+
+    @property
+    def sites(self) -> tuple[tuple[str, bool], ...]:
+        """Tracked sites: name, and whether a load may be fixed there.
+
+        Not to the world, nor to a body whose inertia about its joints MuJoCo keeps as constants (``body_simple``).
+        """
+        bodies = [int(self.model.site(name).bodyid[0]) for name in self.mechanism.sites]
+        return tuple((n, b > 0 and not self.model.body_simple[b]) for n, b in zip(self.mechanism.sites, bodies, strict=True))
+
+    def masses_kg(self, plant: Plant) -> NDArray[np.float64]:
+        """Of the links with all that they carry, (links,)."""
+        out: NDArray[np.float64] = self.changed(plant).body_mass[1:].copy()
+        return out
+
     def _name(self, link: int) -> str:
         return str(self.model.body(link + 1).name) or f"link-{link}"
 
@@ -107,25 +127,41 @@ class Machine:
     @property
     def plant(self) -> Plant:
         """Nothing wrong."""
-        return sound(self.joints, self.model.nbody - 1)
+        return sound(self.joints, self.model.nbody - 1, len(self.mechanism.sites))
+
+    def friction_n_m(self, plant: Plant) -> NDArray[np.float64]:
+        """Dry friction in each joint with a servo, (joints,): that of the model and the plant's, not below none."""
+        own = self.model.dof_frictionloss[self._dofs]
+        out: NDArray[np.float64] = np.maximum(own + plant.friction_rad * self.stiffness_n_m_rad, 0.0)
+        return out
+
+    @property
+    def _dofs(self) -> NDArray[np.int64]:
+        """Degree of freedom of each joint with a servo, (joints,)."""
+        return self.model.jnt_dofadr[self.model.actuator_trnid[:, 0]].astype(np.int64)
 
     def changed(self, plant: Plant) -> Any:
-        """The MuJoCo model with the masses, the friction and the servos' damping of a plant.
+        """The MuJoCo model with the masses, the friction of floor and joints and the servos' damping of a plant.
 
         And with their stiffness and torque, where it bounds them itself (`limits_inside`).
         """
         same = plant.friction_along == plant.friction_across == 1.0
         servos = (plant.damping, *((plant.stiffness, plant.torque) if self.limits_inside else ()))
-        if same and all((factors == 1.0).all() for factors in (plant.mass, plant.grip, *servos)):
+        more = plant.friction_rad.any() or plant.payload.any()
+        if same and not more and all((factors == 1.0).all() for factors in (plant.mass, plant.grip, *servos)):
             return self.model
         model = _copy(self.model)
         model.actuator_biasprm[:, 2] *= plant.damping
+        model.dof_frictionloss[self._dofs] = self.friction_n_m(plant)
         if self.limits_inside:
             model.actuator_gainprm[:, 0] *= plant.stiffness
             model.actuator_biasprm[:, 1] *= plant.stiffness
             model.actuator_forcerange *= plant.torque[:, None]
         model.body_mass[1:] *= plant.mass
         model.body_inertia[1:] *= plant.mass[:, None]
+        for site in np.flatnonzero(plant.payload).tolist():
+            there = self.model.site(self.mechanism.sites[site])
+            carry(model, int(there.bodyid[0]), there.pos, plant.payload[site] * float(self.model.body_mass.sum()))
         grip = np.concatenate([[1.0], plant.grip])[self.pair_links]
         model.pair_friction[:, 0] *= plant.friction_along * grip
         model.pair_friction[:, 1] *= plant.friction_across * grip

@@ -35,7 +35,7 @@ class JointedModel(Model):
     def catalogue(self) -> Mapping[str, Effect]:
         """Name -> effect of a body with these joints and tracked sites."""
         body = machine(self.mechanism)
-        return catalogue(body.joints, self.mechanism.sites, body.links, body.on_the_floor, body.free)
+        return catalogue(body.limited, body.sites, body.links, body.on_the_floor, body.free)
 
     def effect_named(self, name: str) -> Effect:
         """The effect of that name of its catalogue; ModelError with the names there are."""

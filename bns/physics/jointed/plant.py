@@ -49,8 +49,10 @@ class Plant:
 
     Of each joint with a servo, (joints,): ``stiffness`` and ``torque`` (its limit) as factors, ``zero_rad`` (where it is when it
     believes to be at 0), ``damping`` (of a servo that damps by itself) as a factor, ``speed`` (its limit as a share of the
-    fastest that it is told to move; from 1 on none). Of each link, (links,): ``mass`` and ``grip`` (on the floor, all ways) as
-    factors. ``friction_along``, ``friction_across``: of links on the floor, factors along and across their own axes.
+    fastest that it is told to move; from 1 on none), ``friction_rad`` (dry friction beyond the model's: the error that its servo
+    needs to overcome it). Of each link, (links,): ``mass`` and ``grip`` (on the floor, all ways) as factors.
+    Of each tracked site, (sites,): ``payload``, the mass of a load there as a multiple of the whole body's.
+    ``friction_along``, ``friction_across``: of links on the floor, factors along and across their own axes.
     ``dead_band_rad`` and ``delay_s`` come on top of the model's own. ``sag``: share of stiffness and torque limit that is lost
     when all servos pull with all they have. ``rough``: places of the floor with another friction. ``slope``: fall of the floor
     towards east and north, rad. ``pull_n``: force of the tether east and north; ``return_n_m``: the same a metre of way from the
@@ -63,8 +65,10 @@ class Plant:
     zero_rad: Array
     speed: Array
     damping: Array
+    friction_rad: Array
     mass: Array
     grip: Array
+    payload: Array
     friction_along: float = 1.0
     friction_across: float = 1.0
     dead_band_rad: float = 0.0
@@ -84,10 +88,10 @@ class Plant:
         return np.concatenate([np.asarray(values, dtype=np.float64).ravel() for values in of.values()]).tobytes()
 
     def with_joint(self, values: str, joint: str, value: float) -> Plant:
-        """One joint's entry of an array of joints multiplied by a factor; of ``zero_rad`` something added."""
+        """One joint's entry of an array of joints multiplied by a factor; to ``zero_rad`` or ``friction_rad`` it is added."""
         changed = getattr(self, values).copy()
         at = self.joints.index(joint)
-        changed[at] = changed[at] + value if values == "zero_rad" else changed[at] * value
+        changed[at] = changed[at] + value if values in {"zero_rad", "friction_rad"} else changed[at] * value
         return replace(self, **{values: changed})
 
     def with_link(self, values: str, link: int, factor: float) -> Plant:
@@ -96,11 +100,18 @@ class Plant:
         changed[link] *= factor
         return replace(self, **{values: changed})
 
+    def with_payload(self, site: int, load: float) -> Plant:
+        """A load more at one site, as a multiple of the body's mass."""
+        payload = self.payload.copy()
+        payload[site] += load
+        return replace(self, payload=payload)
 
-def sound(joints: tuple[str, ...], links: int) -> Plant:
+
+def sound(joints: tuple[str, ...], links: int, sites: int) -> Plant:
     """The plant with nothing wrong."""
     n = len(joints)
-    return Plant(joints, np.ones(n), np.ones(n), np.zeros(n), np.full(n, np.inf), np.ones(n), np.ones(links), np.ones(links))
+    servos = np.ones(n), np.ones(n), np.zeros(n), np.full(n, np.inf), np.ones(n), np.zeros(n)
+    return Plant(joints, *servos, np.ones(links), np.ones(links), np.zeros(sites))
 
 
 @dataclass(frozen=True)

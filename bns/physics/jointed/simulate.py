@@ -134,10 +134,10 @@ class Simulator:
     def _short_rad(self, plant: Plant) -> Array:
         """How far short of its set point friction stops each joint, (joints,), beyond where it stops one with a sound servo."""
         m, strength = self.machine, np.clip(np.minimum(plant.stiffness, plant.torque), 0.0, 1.0)
-        friction = m.model.dof_frictionloss[m.model.jnt_dofadr[m.model.actuator_trnid[:, 0]]]
+        sound, held = (m.friction_n_m(p) / m.stiffness_n_m_rad for p in (m.plant, plant))
         short: Array = np.full(len(strength), np.inf)
         moves = strength > 0
-        short[moves] = (friction / m.stiffness_n_m_rad)[moves] * (1 / strength[moves] - 1)
+        short[moves] = np.maximum(held[moves] / strength[moves] - sound[moves], 0.0)
         return short
 
     def _stepped(self, plant: Plant, rest: Rest) -> tuple[Array, Array]:
@@ -258,7 +258,7 @@ class _Outside:
         self._machine, self._plant, self._rest = machine, plant, rest
         self.rows = len(rest.turn_rad)
         self._cos, self._sin = np.cos(rest.turn_rad), np.sin(rest.turn_rad)
-        weights = machine.model.body_mass[1:] * plant.mass * -machine.model.opt.gravity[2]
+        weights = machine.masses_kg(plant) * -machine.model.opt.gravity[2]
         east, north = self._into(np.tile(plant.slope, (len(rest.turn_rad), 1)))
         self._down = np.zeros((len(rest.turn_rad), machine.model.nbody, 6))
         self._down[:, 1:, 0], self._down[:, 1:, 1] = east[:, None] * weights, north[:, None] * weights

@@ -82,6 +82,11 @@ def what_is_there(results: Path) -> str:
         return f"{obstacle} is a file, not a folder"
     if not results.is_dir():
         return "the folder does not exist"
+    if any(results.glob("journal.jsonl")) or any((results / "trials").glob("*/journal.jsonl")):
+        return (
+            "the folder holds trials alone, and a trial is stored when it is complete: go on with it by bns trial --resume, or "
+            "store what was driven by bns trial --replay JOURNAL"
+        )
     return "nothing in the folder can be read as results" if any(results.iterdir()) else "the folder is empty"
 
 

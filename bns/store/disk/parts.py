@@ -53,6 +53,11 @@ class Unreadable:
     path: Path
     reason: str
 
+    @property
+    def is_sweep_file(self) -> bool:
+        """Whether it lies in the table of the sweeps' own files (specs/sweep=NAME/FILE): it holds no runs."""
+        return "specs" in self.path.parts[-4:-1]
+
 
 def list_files(results: Path, table: str, sweep: str | None = None) -> list[Path]:
     """Every file of one table (of one sweep) that looks like parquet, by path; folders that are links are followed."""

@@ -12,7 +12,7 @@ import pyarrow as pa
 from bns.errors import StoreError, unknown_name
 from bns.store.read.question import answer, damage_hint
 from bns.store.read.snapshot import Snapshot, full_snapshot, snapshot
-from bns.store.read.views import connect_views
+from bns.store.read.views import DAMAGED, connect_views
 from bns.store.schema import SCHEMAS, SORT_KEYS, read_columns
 
 if TYPE_CHECKING:  # half a second to load, and a run needs no table
@@ -21,9 +21,9 @@ if TYPE_CHECKING:  # half a second to load, and a run needs no table
 Where = str | Mapping[str, Any] | None
 _T = TypeVar("_T")
 _TRIES = 5
-FINISHED = """SELECT sweep, run_id, status FROM runs ANTI JOIN store.unfinished USING (sweep, run_id)
+FINISHED = f"""SELECT sweep, run_id, status FROM runs
     LEFT JOIN (SELECT sweep, run_id, count(*) AS stored FROM evals GROUP BY ALL) USING (sweep, run_id)
-    WHERE status <> 'ok' OR stored = evaluations"""
+    WHERE status <> '{DAMAGED}' AND (status <> 'ok' OR stored = evaluations)"""
 """Over a connection of `connect`: the runs that are really there, as `finished` gives them."""
 _NULLABLE = {field.name for schema in SCHEMAS.values() for field in schema if field.nullable}
 
@@ -32,7 +32,8 @@ def connect(results: Path | str) -> duckdb.DuckDBPyConnection:
     """A DuckDB connection with the views evals, runs, specs, paths, generations and probes.
 
     The views show the results as they are now, finished runs that still stand in a journal included; for
-    later runs connect again. A view is empty where nothing was stored yet.
+    later runs connect again. A view is empty where nothing was stored yet. In runs the status of a run that ended well, and some
+    rows of which are gone or cannot be read, is "damaged".
 
     Raises:
         StoreError: nothing is stored, or a file has another schema version (the message names the command).

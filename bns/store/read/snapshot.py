@@ -147,7 +147,7 @@ def _run_ids(parts: list[Part]) -> set[str]:
 
 def _warn(bad: list[Unreadable]) -> None:
     for file in bad:
-        again = "writes it again" if "specs" in file.path.parts[-4:-1] else "repeats its runs"
+        again = "writes it again" if file.is_sweep_file else "repeats its runs"
         warnings.warn(
             f"{file.path} is skipped: {file.reason}. bns compact moves it to set-aside/, and the sweep {again}.",
             StoreWarning,

@@ -13,6 +13,8 @@ from bns.store.read.snapshot import Snapshot
 from bns.store.record import STATUSES
 from bns.store.schema import SCHEMAS, empty, read_columns
 
+DAMAGED = "damaged"
+"""The status, in the view `runs`, of a run that ended well and whose rows cannot all be read: a sweep does it again."""
 _OPTIONS = "hive_partitioning=true, filename=true"
 # Best first: the best status; a folded copy before one in a journal; the first file by name.
 _BEST_FIRST = "claim, journal, place"
@@ -96,7 +98,11 @@ def _view(table: str, found: Snapshot, touched: set[str]) -> str:
     if mixed:
         placed = f"SELECT *, {_place(found.results / table)} AS place FROM {_read(mixed)}"
         pieces.append(f"SELECT {columns} FROM {_without_losers(placed)}")
-    return " UNION ALL ".join(pieces)
+    rows = " UNION ALL ".join(pieces)
+    if table == "runs" and found.lacking:
+        gone = "(sweep, run_id) IN (SELECT (sweep, run_id) FROM store.unfinished)"
+        return f"SELECT * REPLACE (CASE WHEN {gone} THEN '{DAMAGED}' ELSE status END AS status) FROM ({rows})"
+    return rows
 
 
 def _without_losers(rows: str) -> str:

@@ -22,7 +22,7 @@ def set_aside_damaged(results: Path, sweep: str) -> list[Path]:
     moved = []
     for file in bad:
         moved.append(set_aside(results, file.path))
-        again = "It is written again" if "specs" in file.path.parts[-4:-1] else "Its runs are repeated"
+        again = "It is written again" if file.is_sweep_file else "Its runs are repeated"
         warnings.warn(
             f"{file.path} is set aside as {moved[-1]}: {file.reason}. {again}.",
             StoreWarning,

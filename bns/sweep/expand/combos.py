@@ -33,6 +33,7 @@ class Parts:
     include: list[tuple[Located, dict[str, Any]]] = field(default_factory=list)
     exclude: list[tuple[Located, dict[str, Any]]] = field(default_factory=list)
     tasks: list[tuple[Located, str]] = field(default_factory=list)
+    world_lines: dict[str, int] = field(default_factory=dict)
     keys: dict[str, Located] = field(default_factory=dict)
     """Parameter -> its key under fixed, grid, zip or sample."""
 

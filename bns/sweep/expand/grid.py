@@ -12,13 +12,13 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from bns.errors import SpecError, unknown_name
 from bns.robots import load_robot
-from bns.spec import FIELDS, RunSpec, checked
+from bns.spec import FIELDS, RunSpec, checked, unquoted
 from bns.sweep.expand.combos import Parts, check_size, combinations
 from bns.sweep.expand.sample import range_names, read_sample
 from bns.sweep.expand.shipped_sweeps import sweep_file
@@ -53,6 +53,12 @@ class Sweep:
     first_seed: int = 0
     chosen: tuple[tuple[int, int], ...] | None = None
     """Only these of its runs (number of the combination, seed), in this order; None: all."""
+    world_lines: Mapping[str, int] = field(default_factory=dict, compare=False)
+    """The line of the file on which a world is named."""
+
+    def place_of(self, world: str) -> str:
+        """``file:line: `` of a world, for messages; "" where the file does not name it."""
+        return f"{self.path}:{self.world_lines[world]}: " if world in self.world_lines else ""
 
     @property
     def all_seeds(self) -> range:
@@ -108,7 +114,16 @@ def parse_sweep(text: str, path: Path) -> Sweep:
     _check_default_task(root, parts, combos)
     check_size(parts.seeds * len(combos), places["seeds"][1] if "seeds" in places else root)
     _check_seeds(root, parts, places)
-    return Sweep(parts.name, parts.robot, parts.seeds, tuple(combos.values()), text, path, parts.first_seed)
+    return Sweep(
+        parts.name,
+        parts.robot,
+        parts.seeds,
+        tuple(combos.values()),
+        text,
+        path,
+        parts.first_seed,
+        world_lines=parts.world_lines,
+    )
 
 
 def _places(root: Located) -> dict[str, tuple[Located, Located]]:
@@ -150,14 +165,16 @@ def _read_robot(parts: Parts, value: Located) -> None:
 def _read_seeds(parts: Parts, value: Located) -> None:
     seeds = value.value()
     if not isinstance(seeds, int) or isinstance(seeds, bool) or not 1 <= seeds <= _SEEDS:
-        value.fail(f"seeds is {seeds!r}; it must be a whole number from 1 to {_SEEDS}: how many, from first_seed on.")
+        value.fail(
+            f"seeds is {seeds!r}; it must be a whole number from 1 to {_SEEDS}: how many, from first_seed on.{unquoted(seeds)}"
+        )
     parts.seeds = seeds
 
 
 def _read_first_seed(parts: Parts, value: Located) -> None:
     first = value.value()
     if not isinstance(first, int) or isinstance(first, bool) or not 0 <= first < _SEEDS:
-        value.fail(f"first_seed is {first!r}; it must be a whole number from 0 to {_SEEDS - 1}.")
+        value.fail(f"first_seed is {first!r}; it must be a whole number from 0 to {_SEEDS - 1}.{unquoted(first)}")
     parts.first_seed = first
 
 
@@ -225,7 +242,19 @@ def _lists(parts: Parts, value: Located, what: str) -> dict[str, list[Any]]:
         _check_parameter(name, key)
         elements = each.elements(f"{name} under {what}")
         lists[name] = [_checked(parts, name, key, element) for element in elements]
+        if what == "grid":  # under zip a value may be taken with several of another parameter
+            _check_different(name, elements, lists[name])
     return lists
+
+
+def _check_different(name: str, elements: list[Located], values: list[Any]) -> None:
+    """SpecError where a value is there twice: it would be run once, which is not what somebody meant."""
+    for number, (element, value) in enumerate(zip(elements, values, strict=True)):
+        if value in values[:number]:
+            first = elements[values.index(value)].line
+            element.fail(
+                f"{name} has the value {value!r} twice (first on line {first}). Keep one of the two; runs are repeated by seeds."
+            )
 
 
 def _check_parameter(name: str, key: Located) -> None:
@@ -245,6 +274,8 @@ def _checked(parts: Parts, name: str, key: Located, value: Located) -> Any:
         value.fail(f"{fault}{hint}")
     if name == "task":
         parts.tasks.append((value, result))
+    elif name == "world":
+        parts.world_lines.setdefault(result, value.line)
     return result
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.errors import SpecError, unknown_name
-from bns.spec import FIELDS, checked, field_type
+from bns.spec import FIELDS, checked, field_type, unquoted
 from bns.sweep.expand.yaml_lines import Located
 
 DIGITS = 6
@@ -83,7 +83,7 @@ def range_names(value: Located) -> list[tuple[str, Located]]:
 def _whole(value: Located, name: str, low: int, high: int) -> int:
     given = value.value()
     if not isinstance(given, int) or isinstance(given, bool) or not low <= given <= high:
-        value.fail(f"{name} is {given!r}; it must be a whole number from {low} to {high}.")
+        value.fail(f"{name} is {given!r}; it must be a whole number from {low} to {high}.{unquoted(given)}")
     return int(given)
 
 

@@ -6,10 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from bns.sweep.forecast.plan import Plan
-
-START_UP_S = 10.0
-"""Until all workers of a machine are at work: interpreters, libraries, kernels loaded from disk. Measured: 3 to 10 s."""
+from bns.sweep.forecast.plan import Plan, wall_s
 
 
 @dataclass(frozen=True)
@@ -48,10 +45,7 @@ class Cost:
 
     def seconds_on(self, machine: Machine) -> float:
         """Wall time on ``machine``: rounds of runs, as many at once as it has cores."""
-        if self.runs == 0:
-            return 0.0
-        rounds = math.ceil(self.runs / machine.workers)
-        return START_UP_S + rounds * self.mean_s
+        return wall_s(self.runs * self.mean_s, self.runs, machine.workers)
 
 
 def total(costs: Sequence[Cost]) -> Cost:

@@ -27,6 +27,15 @@ _BYTES_PER_EVALUATION = 100
 """Measured with 100 evaluations a run and 40 runs a file."""
 
 
+START_UP_S = 10.0
+"""Until all workers of a machine are at work: interpreters, libraries, kernels loaded from disk. Measured: 3 to 10 s."""
+
+
+def wall_s(seconds: float, runs: int, workers: int) -> float:
+    """Wall time, s, of runs that take ``seconds`` together on one worker: start-up, then as many at once as workers."""
+    return START_UP_S + math.ceil(runs / workers) * seconds / runs if runs else 0.0
+
+
 @dataclass(frozen=True)
 class Plan:
     """Runs, wall time and disk space of a sweep; ``basis`` says where the estimate comes from.
@@ -65,7 +74,8 @@ def plan(
 ) -> Plan:
     """Count and estimate, the whole or one ``shard``. Without stored runs of this sweep, one short run is carried out and timed.
 
-    Nothing is written. The seconds are wall time with ``jobs`` workers; NaN if the trial run failed.
+    Nothing is written. The seconds are wall time with ``jobs`` workers, their start-up included if there are several; NaN if
+    the trial run failed.
 
     Raises:
         ModelError: a model file that runs to do name as their world is missing or no such file.
@@ -77,7 +87,7 @@ def plan(
     if not todo:
         return Plan(sweep.name, len(specs), len(specs), 0, 0.0, 0.0, "nothing is left to do")
     if job is run_job:
-        check_world_files(todo)
+        check_world_files(todo, sweep.place_of)
     stored = "ok" in finished(results, sweep.name).values()
     seconds, basis = _from_store(results, sweep.name, todo) if stored else _from_trial(todo, job, warm_up)
     return Plan(
@@ -85,7 +95,7 @@ def plan(
         len(specs),
         len(specs) - len(todo),
         len(todo),
-        seconds / min(jobs, len(todo)),
+        seconds if jobs == 1 else wall_s(seconds, len(todo), jobs),
         _bytes(results, sweep.name, todo),
         basis,
     )

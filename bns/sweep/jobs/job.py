@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 import traceback
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from bns.change import change_of
+from bns.errors import ModelError
 from bns.spec import RunSpec
 from bns.store.record import RunRecord
 from bns.sweep.jobs import memory
@@ -81,8 +82,10 @@ def prepare(specs: Iterable[RunSpec]) -> None:
             warm(robot, world)
 
 
-def check_world_files(specs: Iterable[RunSpec]) -> None:
+def check_world_files(specs: Iterable[RunSpec], place_of: Callable[[str], str] = lambda _world: "") -> None:
     """Before anything is written: the model files that these runs name as worlds are there, and are models of the robot.
+
+    ``place_of`` says where a world is named, to stand before what is wrong with it.
 
     Raises:
         ModelError: one is missing or cannot be used.
@@ -91,7 +94,10 @@ def check_world_files(specs: Iterable[RunSpec]) -> None:
     from bns.worlds import build_world  # noqa: PLC0415
 
     for world, robot in sorted({(spec.world, spec.robot) for spec in specs if names_a_file(spec.world)}):
-        build_world(world, load_robot(robot))
+        try:
+            build_world(world, load_robot(robot))
+        except ModelError as error:
+            raise ModelError(f"{place_of(world)}{error}") from error
 
 
 def names_a_file(world: str) -> bool:

@@ -139,7 +139,8 @@ def test_commands_may_be_as_large_as_the_robot_s_limits(tmp_path):
 def test_an_experiment_that_is_complete_is_resumed_with_nothing_left_to_drive(tmp_path):
     journal, commands = tmp_path / "journal.jsonl", np.array([[12000.0, 9000.0, 900.0]], np.float32)
     with HardwareLog(journal, EmulatedClock(np.inf)) as log:
-        log.note("driven", evaluation=1, picked=commands.tolist(), commands=commands.tolist(), poses=np.zeros((2, 3)).tolist())
+        given = commands.tolist()
+        log.note("driven", evaluation=1, picked=given, commands=given, poses=np.zeros((2, 3)).tolist(), rows=[])
     assert _driven_before(journal, [commands], resume=True) == 1
     with pytest.raises(HardwareError, match="drove other commands than the file holds now"):
         _driven_before(journal, [], resume=True)

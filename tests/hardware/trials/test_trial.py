@@ -7,8 +7,11 @@ import re
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from contextlib import nullcontext
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -104,10 +107,21 @@ def test_a_resumed_trial_is_the_trial_that_a_replay_gives(tmp_path, capsys):
 
 def paused(tmp_path):
     """What was asked, and the journal of a trial that was interrupted after some drives."""
-    plan = faults(tmp_path, {"kind": "hang-up", "at_s": 12, "for_s": 2})
     asked = [*TRIAL, "--evaluations", 3, "--results", tmp_path, "--most-rounds", 3]
-    assert call(*asked, *plan) == 3
+    for name, data in _paused_files().items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(data)
     return asked, journal_of(tmp_path)
+
+
+@cache
+def _paused_files():
+    """What such a trial leaves, by path: it is driven once, and every test begins with a copy."""
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
+        plan = faults(place, {"kind": "hang-up", "at_s": 12, "for_s": 2})
+        assert call(*TRIAL, "--evaluations", 3, "--results", place, "--most-rounds", 3, *plan) == 3
+        return {path.relative_to(place): path.read_bytes() for path in place.rglob("*") if path.is_file()}
 
 
 def test_measurements_whose_journal_is_gone_are_not_written_over(tmp_path, capsys):
@@ -127,6 +141,7 @@ def test_measurements_whose_journal_is_gone_are_not_written_over(tmp_path, capsy
     assert call(*asked) == 0
 
 
+@pytest.mark.filterwarnings("default::bns.hardware.link.sealed_lines.LogWarning")
 def test_the_advice_on_a_damaged_journal_works(tmp_path, capsys):
     """Word by word: what is said after each attempt is done in a shell."""
     asked, journal = paused(tmp_path)
@@ -144,10 +159,12 @@ def test_the_advice_on_a_damaged_journal_works(tmp_path, capsys):
     assert "has lost its last lines, or was cut" in said
     subprocess.run(re.search(r"mv \S+ \S+", said)[0].split(), check=True)
     assert call(*asked, "--resume") == 0
+    assert "so nothing shows whether journal.jsonl has lost lines at its end" in capsys.readouterr().err
     assert table.exists()
     assert len(past_evaluations(journal)) == 3
 
 
+@pytest.mark.filterwarnings("default::bns.hardware.link.sealed_lines.LogWarning")
 def test_a_line_of_the_table_that_is_none_is_named_and_the_journal_is_not_blamed(tmp_path, capsys):
     asked, journal = paused(tmp_path)
     table = journal.with_name("measurements.csv")
@@ -159,6 +176,7 @@ def test_a_line_of_the_table_that_is_none_is_named_and_the_journal_is_not_blamed
     assert "lost its last lines" not in said
     subprocess.run(re.search(r"mv \S+ \S+", said)[0].split(), check=True)
     assert call(*asked, "--resume") == 0
+    assert "so nothing shows whether journal.jsonl has lost lines at its end" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("way", [[], ["--resume"]])
@@ -192,6 +210,7 @@ def names_changed(lines):
     return [lines[0].replace("t_s", "time", 1), *lines[1:]]
 
 
+@pytest.mark.filterwarnings("default::bns.hardware.link.sealed_lines.LogWarning")
 @pytest.mark.parametrize(
     ("change", "line"),
     [(end_doubled, -1), (words_in_cells, -1), (middle_doubled, 10), (row_taken_out, 10), (names_changed, 1)],
@@ -207,6 +226,7 @@ def test_a_table_that_is_not_the_journal_s_is_moved_away_as_advised(tmp_path, ca
     assert "lost its last lines" not in said
     subprocess.run(re.search(r"mv \S+ \S+", said)[0].split(), check=True)
     assert call(*asked, "--resume") == 0
+    assert "so nothing shows whether journal.jsonl has lost lines at its end" in capsys.readouterr().err
     assert pd.read_csv(table)["t_s"].notna().all()
 
 
@@ -279,7 +299,10 @@ def test_a_robot_out_of_sight_is_stopped_soon(tmp_path):
     assert stop["t_s"] - 6 < 0.5 + 0.2 + 0.45
 
 
-@pytest.mark.parametrize(("number", "word"), [(signal.SIGINT, "interrupted"), (signal.SIGTERM, "terminated")])
+@pytest.mark.parametrize(
+    ("number", "word"),
+    [(signal.SIGINT, "interrupted"), pytest.param(signal.SIGTERM, "terminated", marks=pytest.mark.slow)],
+)
 def test_signals_stop_the_robot_first(tmp_path, number, word):
     asked = [str(a) for a in (*TRIAL, "--evaluations", 50, "--results", tmp_path)]
     asked[asked.index("inf")] = "30"

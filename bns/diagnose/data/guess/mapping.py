@@ -91,7 +91,8 @@ def guessed(table: pd.DataFrame, others: Mapping[str, pd.DataFrame] | None = Non
     if also or of_topics(table) or _apart(table, everything):
         tree["hold_commands_s"] = float("inf")
     if "trial" not in everything:
-        tree["trials"] = cut_into_trials(tables[told or name], found[told or name])
+        read = [name, *(str(one["file"]) for one in also)]
+        tree["trials"] = cut_into_trials(tables[told or name], found[told or name], [(tables[f], found[f]) for f in read])
     return Guess(tree, tuple(_remarks(everything, tables)), tuple(_blanks(everything, tables)))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from itertools import pairwise
 from typing import Any
 
@@ -22,6 +22,7 @@ _LARGEST_M = DEFAULTS.data.guess_largest_m
 _WINDOW_S = DEFAULTS.data.guess_window_s
 _AGREE, _DISAGREE = DEFAULTS.data.guess_headings
 _STANDING, _GAP, _LASTING = DEFAULTS.data.guess_cuts
+_CLEARER, _ENOUGH = DEFAULTS.data.guess_clear_gaps
 
 
 def unit_of_speeds(table: pd.DataFrame, entries: Mapping[str, Any]) -> dict[str, Any]:
@@ -54,10 +55,13 @@ def unit_of_positions(table: pd.DataFrame, entries: Mapping[str, Any]) -> dict[s
     return {"unit": unit} if 1 / _WITHIN[0] < ratio * LENGTHS[unit] < _WITHIN[0] else {}
 
 
-def cut_into_trials(table: pd.DataFrame, entries: Mapping[str, Any]) -> dict[str, float]:
-    """How to cut a log without trials: where the robot is told to stand, at gaps in time, or into pieces, if it does neither.
+def cut_into_trials(
+    table: pd.DataFrame, entries: Mapping[str, Any], recorded: Iterable[tuple[pd.DataFrame, Mapping[str, Any]]] = ()
+) -> dict[str, float]:
+    """How to cut a log without trials: at clear gaps in time, where the robot is told to stand, at any long gap, or into pieces.
 
-    Where it stands, if no column of the table says when or what it was told.
+    ``table``: with the commands, ``recorded``: all files and their entries, for a gap is where none of them has a row; by default
+    the table alone. Where it stands, if no column of the table says when or what it was told.
     """
     told = [name for name in (*COMMANDS, FORWARD, TURN) if name in entries]
     numbers = _columns(table, entries, ("t_s", *told)) if told else None
@@ -66,9 +70,33 @@ def cut_into_trials(table: pd.DataFrame, entries: Mapping[str, Any]) -> dict[str
     t, *speeds = numbers
     still = np.max([np.abs(np.nan_to_num(one)) for one in speeds], axis=0) == 0.0
     turned = np.flatnonzero(np.diff(still.astype(int)))
-    if any(still[a + 1] and t[b] - t[a] >= _STANDING for a, b in pairwise(turned)):
+    stands = sum(bool(still[a + 1]) and t[b] - t[a] >= _STANDING for a, b in pairwise(turned))
+    between = _between_rows(list(recorded) or [(table, entries)])
+    clear = _clear_gaps(between)
+    if clear is not None and (between > clear).sum() >= _ENOUGH * stands:
+        return {"gap_s": clear}
+    if stands:
         return {"standing_s": _STANDING}
-    return {"gap_s": _GAP} if np.nanmax(np.diff(t), initial=0.0) > _GAP else {"lasting_s": _LASTING}
+    return {"gap_s": _GAP} if between.max(initial=0.0) > _GAP else {"lasting_s": _LASTING}
+
+
+def _between_rows(recorded: Iterable[tuple[pd.DataFrame, Mapping[str, Any]]]) -> np.ndarray:
+    """Times (s) from each row to the next one, whatever file they are in; none where a file does not say when its rows are of."""
+    known = [(table, {} if entries.get("t_s", {}).get("unit") == "date" else entries) for table, entries in recorded]
+    found = [_columns(table, entries, ("t_s",)) for table, entries in known]
+    times = [numbers[0] for numbers in found if numbers is not None]
+    return np.diff(np.sort(np.concatenate(times))) if len(times) == len(found) else np.zeros(0)
+
+
+def _clear_gaps(between: np.ndarray) -> float | None:
+    """A time (s) that lies well between those from row to row of a recording and those of its gaps; None where nothing does."""
+    lasts = np.sort(between[np.isfinite(between) & (between > 0)])
+    wider = lasts[1:] / lasts[:-1]
+    wider[lasts[1:] <= _GAP] = 0.0
+    if not wider.max(initial=0.0) >= _CLEARER:
+        return None
+    at = int(wider.argmax())
+    return _GAP if lasts[at] < _GAP else float(f"{np.sqrt(lasts[at] * lasts[at + 1]):.2g}")
 
 
 def metres_a_unit(table: pd.DataFrame, entries: Mapping[str, Any], largest_m: float | None = None) -> float | None:

@@ -21,7 +21,7 @@ EFFECT = Effect(
     ),
     equation="torque = stiffness * k * error",
     residuals="Lifted parts sag, so that the distance between markers differs from the model's; more so when lifted higher.",
-    lookalikes=("torque-limit", "supply-sag", "dead-band"),
+    lookalikes=("torque-limit", "supply-sag", "dead-band", "dry-friction"),
     sentence="the joints are softer or stiffer than the model's",
     sized="the joints are {stiffness:stiffer|softer} than the model's",
     measurement="hang a known weight on an arm that a servo holds level, and measure how far it sinks",

@@ -21,7 +21,7 @@ EFFECT = Effect(
     ),
     equation="torque = 0 while |error| < band",
     residuals="Small amplitudes move the robot less than predicted; large ones nearly as predicted.",
-    lookalikes=("compliance",),
+    lookalikes=("compliance", "dry-friction"),
     sentence="the servos have a wider dead band (more play) than the model's",
     measurement="turn a servo's arm back and forth by hand while it holds a position, and measure the play",
     starts=((0.03,), (0.09,)),

@@ -21,7 +21,7 @@ EFFECT = PerLink(
         ),
         equation="m' = factor * m of one link, about the same centre of mass",
         residuals="The robot turns about this link, since it presses harder on the floor; a link that hangs sags more.",
-        lookalikes=("uneven-mass", "link-friction", "weak-joint"),
+        lookalikes=("uneven-mass", "link-friction", "weak-joint", "payload"),
         sentence="{link} is heavier or lighter than the model says",
         measurement="weigh the robot, or take {link} off and weigh it with all that is fixed to it",
         apply=apply,

@@ -25,7 +25,7 @@ EFFECT = PerJoint(
         ),
         equation="torque' = strength * torque of one joint",
         residuals="The distance between markers and the direction of motion differ in the cycles that use this joint.",
-        lookalikes=("joint-zero", "compliance"),
+        lookalikes=("joint-zero", "compliance", "soft-joint", "joint-friction"),
         sentence="the servo of {joint} is weak or gives no torque",
         measurement="switch the robot on, lift it, and press against {joint} by hand: a sound servo resists",
         starts=((0.8,), (0.4,), (0.0,)),

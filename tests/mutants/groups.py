@@ -1,6 +1,6 @@
-"""The rooms where numbers are made, and the tests nearest to each."""
+"""Groups of modules where numbers are made, and the tests nearest to each."""
 
-ROOMS: dict[str, tuple[str, str]] = {
+GROUPS: dict[str, tuple[str, str]] = {
     "engine": (
         "bns/engine/[!_rj]*.py bns/engine/rprop.py",
         "tests/engine tests/robots/test_snake_breeding.py tests/diagnose/test_pose_filter.py",
