@@ -89,18 +89,12 @@ def notes_on(
         yield _on_longer(selection, names)
     yield from _on_place(found)
     yield from _on_rest(found.rest, tracks)
-    formula, with_terms = found.formula, found.errors_with_terms
+    formula = found.formula
     if formula is not None and not formula.signal and formula.paired_comparison.p_value < CHANCE:
         values = ", ".join(f"{k} = {v:.4g}" for k, v in formula.values.items())
         said = f"{formula_in_words}: " if formula_in_words else ""
         yield f"A candidate term: {said}{formula.on} + {formula.term} with {values}."
-    if terms and with_terms is not None and with_terms.rose_in_the_end:
-        yield _on_rejected(terms, with_terms)
-    elif terms:
-        yield from (f"What no listed effect explains behaves like this: {words}." for words in terms)
-        yield from map(_on_cancelling, cancelled(selection.fit, found.terms[0].fit, selection.accepted))
-        if with_terms is not None and not with_terms.falls:
-            yield _NO_LOWER
+    yield from _on_terms(found, terms)
     if hint is not None:
         more = int(np.ceil(len(tracks) * max((3.2 / max(hint.paired_comparison.z, 0.5)) ** 2 - 1, 0.5)))
         yield f"{hint.name} may be missing, but {len(tracks)} trials are too few to decide; about {more} more would decide."
@@ -110,6 +104,19 @@ def notes_on(
                 f"{c.name} would lower the error, but is no explanation: fitted, {c.rejected_because}. If a measurement of your "
                 "own says that this is so, add the effect all the same (bns add)."
             )
+
+
+def _on_terms(found: Outcome, terms: Sequence[str]) -> Iterator[str]:
+    """On what no effect explains, in words; or why it is not in the extended model."""
+    selection, with_terms = found.selection, found.errors_with_terms
+    if with_terms is not None and with_terms.rose_in_the_end:
+        yield from [_on_rejected(terms, with_terms)] if terms else []
+        return
+    yield from (f"What no listed effect explains behaves like this: {words}." for words in terms)
+    if found.terms:
+        yield from map(_on_cancelling, cancelled(selection.fit, found.terms[0].fit, selection.accepted))
+    if terms and with_terms is not None and not with_terms.falls:
+        yield _NO_LOWER
 
 
 def _on_cancelling(each: Cancelled) -> str:

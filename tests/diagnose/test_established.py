@@ -87,7 +87,7 @@ def test_a_curve_that_predicts_better_for_certain_comes_before_an_effect_that_im
     problem = problem_for(predictor, NOMINAL)
     left = {"speed-gain": listed(NOMINAL, None, predictor.tracks)["speed-gain"]}
     grammar = families(predictor, NOMINAL.wheelbase_m)
-    following = _step(predictor, _State(problem, problem.fit(NOMINAL)), left, grammar, 0.01)
+    following = _step(predictor, _State(problem, problem.fit(NOMINAL)), left, grammar, 0.01, {})
     assert following.names == ()
     assert [term.signal for term in following.terms] == ["time in the trial"]
 
