@@ -31,7 +31,8 @@ def told(store):
     return made
 
 
-@pytest.mark.parametrize("which", ["study", pytest.param("real_results", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("which", ["study", "real_results"])
 def test_every_figure_and_finding_is_the_same_from_the_archive(which, request, tmp_path):
     results = request.getfixturevalue(which)
     path = archive(results, tmp_path / "study.parquet").path

@@ -148,6 +148,7 @@ def test_nothing_is_kept_where_it_is_turned_off_or_cannot_be(table, asked, tmp_p
     assert bns.compare(table, NOMINAL).errors.loc["1s", "windows"] > 0
 
 
+@pytest.mark.slow
 def test_effects_in_files_are_never_taken_from_before(table, asked, tmp_path):
     (tmp_path / "e.py").write_text(
         "from bns.physics.effect import Effect, Parameter\n"

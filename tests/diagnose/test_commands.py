@@ -57,6 +57,7 @@ def test_added_effects_lower_the_error_and_the_model_comes_back(data, tmp_path, 
     assert "already has turn-slip" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_diagnosis_writes_the_model_that_it_found_and_says_how(data, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("BNS_CACHE", str(tmp_path / "cache"))  # as a user's: what is asked twice is computed once
     new, added = tmp_path / "found.yaml", tmp_path / "added.yaml"

@@ -41,6 +41,7 @@ def test_a_set_with_which_the_held_out_error_does_not_fall_is_withdrawn(monkeypa
     assert all(error["after"] == error["before"] for error in found.as_json()["error"].values())
 
 
+@pytest.mark.slow
 def test_effects_come_before_what_is_not_explained(monkeypatch):
     predictor = WheelPredictor(tracks_of(measured(hidden(yaw_bias={"rate_rad_s": 0.05}), trials=14, seed=11)))
     found = found_with(monkeypatch, predictor, "yaw-bias")
@@ -116,6 +117,7 @@ def test_a_verdict_says_how_much_and_to_which_side(monkeypatch):
     assert lines[at + 2] == f"    {effect_named('yaw-bias').equation}"
 
 
+@pytest.mark.slow
 def test_what_is_left_is_described_once(monkeypatch):
     predictor = WheelPredictor(tracks_of(measured(hidden(yaw_bias={"rate_rad_s": 0.05}), trials=14, seed=11)))
     found = found_with(monkeypatch, predictor, "yaw-bias")

@@ -203,6 +203,7 @@ def test_a_log_of_scan_matches_is_seen_for_what_it_is(tmp_path):
     assert import_log([path], filled(guess)).trials > 100
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["diff_drive_optitrack.parquet", "skid_steer_terrains.parquet"])
 def test_shared_tables_need_no_mapping(name):
     path = SHARED / name

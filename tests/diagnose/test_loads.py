@@ -182,6 +182,7 @@ def test_an_extension_equals_what_it_extends_where_its_own_numbers_are_neutral()
             np.testing.assert_allclose(one, other, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_slope_on_wheels_that_grip_is_no_drift():
     slope = {"x_m_s": 0.012, "y_m_s": -0.007, "behind_share": 0.1, "at_rest": 0.0}
     answer = diagnose(

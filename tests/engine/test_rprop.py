@@ -105,6 +105,7 @@ def test_training_follows_the_double_precision_twin(algorithm):
     assert ours < mse(weights, X, targets) / 100
 
 
+@pytest.mark.slow
 def test_irprop_minus_is_torchs_rprop():
     weights, X, targets = problem()
     rule, net = Rprop.start(weights[:1], "irprop-"), Network(weights[0].copy())

@@ -94,7 +94,7 @@ def test_result_is_that_of_the_loop(together):
         np.testing.assert_allclose(there.learned_from, here.learned_from, rtol=1e-6)
 
 
-@pytest.mark.parametrize("spec", [TINY, SNAKE], ids=lambda spec: spec.robot)
+@pytest.mark.parametrize("spec", [TINY, pytest.param(SNAKE, marks=pytest.mark.slow)], ids=lambda spec: spec.robot)
 def test_one_run_shows_every_evaluation_as_it_ends(spec, monkeypatch):
     monkeypatch.setattr(batches, "THREADS", 2)
     rows, spec = [], replace(spec, generations_per_evaluation=0, training_iterations_per_evaluation=0)

@@ -70,6 +70,7 @@ def test_children_are_those_of_the_cpu_engine(size, rate, shortest, longest):
     assert_children("khepera", size, rate, shortest, longest)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("size", "rate"), [(1, 0.5), (2, 1.0), (5, 0.3)])
 def test_children_of_snakes_are_those_of_the_cpu_engine(size, rate):
     assert_children("snake", size, rate, 1, 2)

@@ -223,6 +223,7 @@ def test_an_experiment_repeats_the_stretches_that_tell_most(bent_arm, tmp_path):
     assert proposed.plot().get_xlabel() == "ahead (cm)"
 
 
+@pytest.mark.slow
 def test_what_is_planned_tells_more_than_stretches_by_lot(bent_arm):
     d = bent_arm.diagnosis
     models = competing_models_of(d)
@@ -233,6 +234,7 @@ def test_what_is_planned_tells_more_than_stretches_by_lot(bent_arm):
     assert totals[0] > 1.1 * totals[1]
 
 
+@pytest.mark.slow
 def test_limits_of_wheels_are_refused_for_a_body(bent_arm):
     with pytest.raises(DataError, match="for wheels"):
         bent_arm.propose(arena=(2.0, 2.0))

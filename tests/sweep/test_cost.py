@@ -26,6 +26,7 @@ grid: {population_size: [20, 100, 400]}
 """
 
 
+@pytest.mark.slow
 def test_estimate_is_within_half_as_much_again_of_what_it_takes(tmp_path):
     ratios = []
     for number in range(3):  # whatever else this machine does may fall into one of the two
