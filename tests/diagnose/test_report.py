@@ -106,7 +106,7 @@ def test_every_verdict_has_a_page_that_needs_nothing_else(page_of, verdict):
     [
         ("none", "Nothing is missing"),
         pytest.param("effects", "turning costs forward speed", marks=pytest.mark.slow),
-        pytest.param("tie", "every wheel loses a constant part of its speed to friction, or ", marks=pytest.mark.slow),
+        pytest.param("tie", "every wheel loses a constant part of its speed to friction; or ", marks=pytest.mark.slow),
         pytest.param("unlisted", "none of the known effects", marks=pytest.mark.slow),
         ("insufficient-data", "do not suffice"),
     ],

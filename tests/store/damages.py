@@ -22,6 +22,7 @@ import pandas as pd
 from bns.errors import BnsError
 from bns.store import SCHEMAS, Writer, compact, connect, finished
 from bns.store.disk.parts import find_parts
+from bns.store.read.views import DAMAGED
 from bns.store.record import RunRecord
 from bns.store.schema import RECORDED, SORT_KEYS, read_columns
 from tests.store.synthetic import failed, record, specs
@@ -148,6 +149,8 @@ def _judged(
         warnings.simplefilter("always")
         seen = tables(work)
     said = "\n".join(str(one.message) for one in caught)
+    if said:  # a run whose rows are not all there says so; whatever else is in its row must be what was stored
+        seen["runs"] = seen["runs"].replace({"status": {DAMAGED: "ok"}})
     strange = [table for table in SCHEMAS if not _is_part_of(seen[table], reference[table])]
     short = [table for table in SCHEMAS if len(seen[table]) < len(reference[table])]
     after = path.read_bytes() if path.exists() else b""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from bns.app.screens.working import Working
 from bns.app.tab import Tab
 from bns.app.workbench import Workbench
 from bns.diagnose.report.proposal_figure import foreseen
+from bns.diagnose.report.proposal_text import proposal_lines
 from bns.errors import DataError
 
 _SIDES = ("x from (m)", "x to (m)", "y from (m)", "y to (m)")
@@ -111,7 +113,8 @@ class ExperimentPart:
         rows = [[f"{p.first} or {p.second}", f"{p.power:.0%}", _minutes(p)] for p in pairs]
         caption = f"{len(result.proposal.plan)} trials"
         columns = ["which is it?", "chance of a decision", "minutes for a probability of 90 %"]
-        self._table.object = table(columns, rows, caption, "bns-pairs")
+        said = "".join(f"<p>{escape(line)}</p>" for line in proposal_lines(result.proposal))
+        self._table.object = table(columns, rows, caption, "bns-pairs") + said
         curves = [(p.power_by_minutes, f"{p.first} / {p.second}") for p in pairs if p.power_by_minutes]
         if curves:
             self._power.fill([c for c, _ in curves], [name for _, name in curves])

@@ -176,8 +176,8 @@ def _step(
 ) -> _State | None:
     """The best effect or term added; None where neither earns anything.
 
-    Beside one term no second one comes in where one of the ``others`` predicts as well with fewer numbers and leaves nothing
-    unexplained: the first term had hidden it. Where more is left, an effect would imitate what the terms fail to describe.
+    Beside one term no second one comes in where one of the ``others`` predicts as well with fewer numbers: the first term had
+    hidden it. Beside more terms an effect would imitate what these fail to describe.
     """
     problem, fit = state.problem, state.fit
     tried = _tried(problem, fit, left, state.known)
@@ -187,9 +187,8 @@ def _step(
     term = _better_term(problem, fit, curves, earned.get(best), level)
     if term is not None:
         name, added = _in_its_place(problem, fit, term, others) if len(state.terms) == 1 else ("", fit)
-        with_effect = replace(state.settled(predictor, added), names=(*state.names, name)) if name else None
-        if with_effect is not None and not _leaves_something(with_effect.problem, with_effect.fit):
-            return with_effect
+        if name:
+            return replace(state.settled(predictor, added), names=(*state.names, name))
         return replace(state.settled(predictor, term.fit), terms=(*state.terms, term))
     if not best:
         return None
