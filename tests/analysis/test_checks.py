@@ -137,6 +137,7 @@ def test_low_diversity_spreads_error_and_success(tmp_path):
     assert both(tmp_path, spread(True), spread(False), "low_diversity_spreads", measure="fitness_error") == ["agrees", "differs"]
 
 
+@pytest.mark.slow
 def test_two_clusters_and_whose_the_lower_one_is(tmp_path, monkeypatch):
     def at(middle):
         def runs(rate, size, seed):

@@ -64,6 +64,7 @@ def warming(share=-0.15, **effects):
     return hidden(**effects).with_active(formula_effect("rough", "k * exp(-tau / 2)", "share"), (share,))
 
 
+@pytest.mark.slow
 def test_an_effect_that_is_there_stands_and_one_that_imitates_the_rest_does_not():
     predictor = predictor_of(warming(wheelbase={"factor": 1.06}))
     found = stands(predictor, "wheelbase", "speed-gain")
@@ -414,6 +415,7 @@ def test_what_a_patch_of_floor_does_is_said_of_the_velocity_that_it_changes(on, 
     assert in_words(patch, None) == f"{said} (0.1, 0.2) m"
 
 
+@pytest.mark.slow
 def test_a_formula_that_is_no_part_of_the_model_is_called_a_hint():
     predictor = predictor_of(NOMINAL)
     found, problem = diagnose(predictor, NOMINAL), problem_for(predictor, NOMINAL)

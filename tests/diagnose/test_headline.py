@@ -134,6 +134,7 @@ def test_what_is_left_is_described_once(monkeypatch):
     assert diagnosis_text(left).count("one wheel rubs") == 1
 
 
+@pytest.mark.slow
 def test_a_set_with_which_it_falls_stays(monkeypatch):
     predictor = WheelPredictor(tracks_of(measured(hidden(yaw_bias={"rate_rad_s": 0.05}), trials=14, seed=11)))
     found = found_with(monkeypatch, predictor, "yaw-bias")

@@ -356,6 +356,7 @@ def test_a_lag_from_the_bench_stays_where_turns_lag_alike():
     assert {a.effect.name for a in fit.model.effects} == {"motor-lag", "wheelbase"}
 
 
+@pytest.mark.slow
 def test_an_extension_is_held_against_what_it_extends_under_the_same_noise(monkeypatch):
     """Else one came in that the look back threw out, round after round."""
     asked = []

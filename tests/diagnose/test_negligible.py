@@ -52,6 +52,7 @@ def selected(*names):
     return SelectionResult(problem, problem.fit(NOMINAL), fit, names, ())
 
 
+@pytest.mark.slow
 def test_half_a_millisecond_is_negligible_and_a_small_mismatch_is_not():
     assert negligible(selected("wheelbase", "wheel-mismatch", "clock-offset")) == ("clock-offset",)
     assert negligible(selected("wheelbase", "wheel-mismatch")) == ()
@@ -252,6 +253,7 @@ def test_what_adds_less_than_tracking_noise_does_not_count(monkeypatch, error_m,
         assert said.startswith("What is left is certain but slight: at every horizon it adds less to the error than the noise")
 
 
+@pytest.mark.slow
 def test_of_several_effects_only_those_that_raise_the_error_are_withdrawn(monkeypatch):
     """A stand-in for the errors: with the mismatch they rise, and fall with the wheelbase alone."""
     searched = selected("wheelbase", "wheel-mismatch", "clock-offset")

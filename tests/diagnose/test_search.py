@@ -62,6 +62,7 @@ def test_an_early_clock_is_no_late_command():
     assert "clock-offset is an error of the measurement, not of the robot." in answer["notes"]
 
 
+@pytest.mark.slow
 def test_what_no_list_holds_is_called_so_and_a_formula_offered():
     rough = formula_effect("rough", "k * v * exp(-tau / 3)", "v")
     model = NOMINAL.with_active(rough, (-0.12,))
@@ -72,6 +73,7 @@ def test_what_no_list_holds_is_called_so_and_a_formula_offered():
     assert answer["formula"]["elpd_diff"] > 0
 
 
+@pytest.mark.slow
 def test_a_model_that_has_the_effect_already_lacks_nothing():
     table = measured(hidden(wheelbase={"factor": 1.05}), trials=20, seed=11)
     model = NOMINAL.with_effect("wheelbase", factor=1.0)

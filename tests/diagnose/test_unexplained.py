@@ -103,6 +103,7 @@ def test_poses_at_commands_ends_have_no_moments():
     assert found_in(measured(NOMINAL, seed=3, ends_only=True)) == []
 
 
+@pytest.mark.slow
 def test_a_diagnosis_says_where_to_look():
     table = kicked(measured(NOMINAL, trials=20, seed=3), [1, 8, 9, 15])
     found = diagnose(WheelPredictor(tracks_of(table)), NOMINAL)

@@ -194,6 +194,7 @@ def textbook_overshoot(t, frequency_hz, damping):
     return t - 2 * damping / wn + decay * (2 * damping / wn * np.cos(wd * t) + (2 * damping**2 - 1) / wd * np.sin(wd * t))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("told", "ratio"), [((0.1, 0.1), 3.0), ((-0.1, 0.1), 1.0)])
 def test_overshoot_is_the_step_response_of_the_textbook(told, ratio):
     frequency_hz, damping, t = 2.0, 0.4, np.linspace(0.1, 1.5, 8)
@@ -204,6 +205,7 @@ def test_overshoot_is_the_step_response_of_the_textbook(told, ratio):
     np.testing.assert_allclose(way, 0.1 * textbook_overshoot(t, frequency_hz, damping), atol=1.5e-4)
 
 
+@pytest.mark.slow
 def test_in_turns_a_wheel_swings_with_the_inertia_that_it_moves_then():
     wn, t = 2 * np.pi * 2.0, np.linspace(0.1, 1.5, 8)
     cause = ControllerOvershoot(0.8 / wn, 0.0, 1 / wn, 4.0)  # half the frequency, half the damping ratio

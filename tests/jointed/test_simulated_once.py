@@ -80,6 +80,7 @@ def test_wild_stretches_are_left_out_before_they_are_simulated_finely(tracks, as
     assert [which for dt, which in asked if dt == fine] == [list(range(1, there))]
 
 
+@pytest.mark.slow
 def test_a_model_is_worked_out_finely_where_numbers_are_settled(tracks, asked):
     predictor = JointedPredictor(tracks, SNAKE)
     model = SNAKE.with_effect("floor-friction", factor=1.5)
