@@ -17,6 +17,7 @@ from bns.diagnose.estimate.smoothing_tracker import LAG, smoothing_tracker
 from bns.diagnose.outcome import Outcome
 from bns.diagnose.predict.horizons import IN_WORDS
 from bns.diagnose.predict.paired_errors import PairedErrors
+from bns.diagnose.residuals.grammar import SHIFTS
 from bns.diagnose.residuals.outliers import FAR
 from bns.diagnose.residuals.unexplained import Unexplained
 from bns.diagnose.residuals.worst_trials import WithoutWorst
@@ -38,8 +39,6 @@ WORST_SHARE = DEFAULTS.residuals.worst_share
 SHOWN = DEFAULTS.report.moments
 OFTEN = DEFAULTS.verdict.often
 FEWEST_CLOCKS = DEFAULTS.verdict.fewest_clocks
-DELAYS = ("command-delay", "clock-offset")
-"""Effects that the mean delay of poses that are stamped late looks like."""
 
 
 def notes_on(
@@ -312,7 +311,7 @@ def _on_drift(name: str, start_s: Array, own_s: Array) -> Iterator[str]:
 
 def _on_stamps(tracks: Tracks, names: Collection[str]) -> Iterator[str]:
     """On delays that may be the mean of those with which poses are stamped."""
-    late = [name for name in DELAYS if name in names]
+    late = [name for name in SHIFTS if name in names]
     scatter = stamp_scatter(tracks) if late and tracks.timed else None
     if scatter is not None:
         yield (

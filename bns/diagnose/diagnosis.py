@@ -280,8 +280,7 @@ def _diagnosed(
     words = tuple(in_words(term, predictor) for term in found.terms)
     formula = _formula_in_words(found.formula, predictor) if not found.terms else ""
     judged = {*found.withdrawn, *found.imitating, *found.negligible}
-    # what no effect explains lifts many effects a little
-    hint = None if left else _hint(found.selection, len(predictor.tracks), judged)
+    hint = _hint(found.selection, len(predictor.tracks), judged, left)
     tick("longer explanations")
     pairs = [] if left else _longer(found.selection, listed(found.selection.nominal.model, extra, predictor.tracks, barred))
     notes = notes_on(found, predictor.tracks, hint, pairs, words, [in_words(t, predictor) for t in found.slight], formula)
@@ -370,9 +369,14 @@ def _verdict(selection: SelectionResult, unexplained: bool, hint: Candidate | No
     return "insufficient-data" if hint else "none"
 
 
-def _hint(selection: SelectionResult, trials: int, judged: Collection[str] = ()) -> Candidate | None:
-    """The best candidate of a search that accepted nothing, where few trials nearly sufficed; none that was ``judged``."""
-    if selection.accepted or trials >= FEW_TRIALS:
+def _hint(
+    selection: SelectionResult, trials: int, judged: Collection[str] = (), unexplained: bool = False
+) -> Candidate | None:
+    """The best candidate of a search that accepted nothing, where few trials nearly sufficed; none that was ``judged``.
+
+    None where something is left ``unexplained``: what no effect explains lifts many effects a little.
+    """
+    if unexplained or selection.accepted or trials >= FEW_TRIALS:
         return None
     step, least = selection.steps[0], MIN_GAIN * float(selection.nominal.losses.mean())
     level = _HINT * FALSE_ALARM / max(step.of, len(step.ranking), 1)

@@ -9,6 +9,7 @@ import pytest
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.residuals import moments_share
 from bns.diagnose.residuals.moments_share import (
     _PROPERTIES,
     FEWEST,
@@ -99,13 +100,13 @@ def test_motors_that_stop_after_large_steps_are_told_by_the_size_of_the_step():
 
 def test_motors_that_stop_as_a_wheel_turns_back_are_told_by_that():
     found = asked(driven(lambda before, after: np.abs(after[before * after < 0]).max(initial=0.0) > 0.06))
-    assert "turns back" in found.clause
+    assert "reverse a wheel" in found.clause
     assert found.limit == pytest.approx(0.06, abs=0.02)
 
 
 def test_motors_that_stop_after_the_change_of_a_wheel_is_small_are_told_by_the_smaller_change():
     found = asked(driven(lambda before, after: np.abs(after - before).min() < 0.04, trials=20))
-    assert "the wheel that changes less" in found.clause
+    assert "the smaller change" in found.clause
     assert not found.above
     assert found.limit == pytest.approx(0.04, abs=0.01)
 
@@ -128,6 +129,19 @@ def test_few_moments_say_nothing():
     judged = judged_windows(problem, fit)
     few = np.flatnonzero(judged.stands_out)[: FEWEST - 1]
     assert shared_cause(problem, replace(judged, stands_out=np.isin(np.arange(len(judged.start)), few))) is None
+
+
+@pytest.mark.parametrize(("changes", "found"), [(16, False), (40, True)])
+def test_each_limit_that_was_tried_is_a_chance(monkeypatch, changes, found):
+    """Half of the changes are followed, just those above a limit. Of 16 that is 1 in 6,435, and some 400 limits were tried."""
+    problem, fit = left_in(driven(lambda before, after: False))
+    properties = np.zeros((changes, len(_PROPERTIES)))
+    properties[:, :] = np.arange(changes)[:, None]
+    asked_of = _Changes(np.zeros(changes, dtype=int), np.arange(changes), properties)
+    monkeypatch.setattr(moments_share, "_changes", lambda tracks: asked_of)
+    judged_as = np.ones(changes, dtype=bool), np.arange(changes) >= changes // 2
+    monkeypatch.setattr(moments_share, "_followed", lambda *given: judged_as)
+    assert (shared_cause(problem, judged_windows(problem, fit)) is not None) == found
 
 
 def test_what_is_left_names_it():

@@ -277,16 +277,18 @@ def test_what_could_stand_in_place_of_the_newest_effect_is_known_from_the_round_
         ({"rejected_because": "at its bound"}, False),
         ({"accepted": ("wheelbase",)}, False),
         ({"trials": diagnosis.FEW_TRIALS}, False),
+        ({"unexplained": True}, False),
     ],
 )
 def test_a_sign_is_worth_more_trials_only_where_few_nearly_sufficed(change, hinted):
     given = {"z": 3.0, "p_value": 0.002, "elpd_diff": 1.0, "losses": 9.0, "rejected_because": "", "accepted": (), "trials": 12}
+    given["unexplained"] = False
     given |= change
     earned = SimpleNamespace(p_value=given["p_value"], z=given["z"], elpd_diff=given["elpd_diff"])
     candidate = SimpleNamespace(name="turn-slip", rejected_because=given["rejected_because"], paired_comparison=earned)
     nominal = SimpleNamespace(losses=np.full(12, given["losses"]))
     found = SimpleNamespace(accepted=given["accepted"], steps=(SelectionStep((candidate,), 0.5, ""),), nominal=nominal)
-    assert (diagnosis._hint(found, given["trials"]) is candidate) is hinted
+    assert (diagnosis._hint(found, given["trials"], unexplained=given["unexplained"]) is candidate) is hinted
 
 
 @pytest.mark.parametrize("better", [(False,), (True, True, True), (True, False)])

@@ -11,12 +11,11 @@ from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.design.sequences import Sequences
 from bns.diagnose.predict.horizons import laid_paths
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.residuals.grammar import SHIFTS
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.model import Model
 
 _PLACE_ROUNDS = DEFAULTS.design.place_rounds
-_SHIFTS = ("command-delay", "clock-offset")
-"""Effects that do the same as each other: what is seen comes a constant time after the command."""
 
 
 def planned_tracks(
@@ -43,7 +42,7 @@ def planned_tracks(
 
 def delays_of(models: Iterable[Model]) -> tuple[float, ...]:
     """Constant times (s) by which any of the models lets commands or stamps be late."""
-    acting = (active for model in models for active in model.effects if active.effect.name in _SHIFTS)
+    acting = (active for model in models for active in model.effects if active.effect.name in SHIFTS)
     return tuple(sorted({float(value) for active in acting for value in active.values}))
 
 

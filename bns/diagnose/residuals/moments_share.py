@@ -25,17 +25,17 @@ PURE = DEFAULTS.residuals.share_pure
 _SPEED, _TIME = "m/s", "s"
 _PROPERTIES = (
     ("change both wheels' speeds by {0} in all", _SPEED),
-    ("change the speed of the wheel that changes more by {0}", _SPEED),
-    ("change the speed of the wheel that changes less, but changes, by {0}", _SPEED),
+    ("change one wheel's speed by {0} (the larger change)", _SPEED),
+    ("change one wheel's speed by {0} (the smaller change)", _SPEED),
     ("change the forward speed by {0}", _SPEED),
     ("change the difference between the wheels' speeds by {0}", _SPEED),
-    ("reverse a wheel that then turns back at {0}", _SPEED),
+    ("reverse a wheel, which then turns at {0}", _SPEED),
     ("demand a forward speed of {0}", _SPEED),
     ("demand a wheel's speed of {0}", _SPEED),
     ("demand a difference between the wheels' speeds of {0}", _SPEED),
     ("slow a wheel down by {0}", _SPEED),
     ("speed a wheel up by {0}", _SPEED),
-    ("follow the change before after {0}", _TIME),
+    ("come {0} after the change before", _TIME),
     ("come {0} after the beginning of the trial", _TIME),
 )
 """What a change of command has, as a clause with a number, and its unit; in the order of `_properties`."""
@@ -89,9 +89,10 @@ def shared_cause(problem: Problem, judged: JudgedWindows) -> SharedCause | None:
     if min(followed.sum(), (seen & ~followed).sum()) < FEWEST:
         return None
     splits = [split for j in range(len(_PROPERTIES)) for split in _splits(changes.properties[seen, j], followed[seen], j)]
+    tried = len(splits) * int(seen.sum())  # a limit may lie between any two values
     for _, split in sorted(splits, key=lambda pair: -pair[0]):
         table = [[split.followed, split.beyond - split.followed], [split.others_followed, split.others - split.others_followed]]
-        if float(fisher_exact(table)[1]) * len(splits) < CHANCE and _pure(split):
+        if float(fisher_exact(table)[1]) * tried < CHANCE and _pure(split):
             return split
     return None
 
