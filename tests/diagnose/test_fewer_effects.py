@@ -13,10 +13,12 @@ from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import Diagnosis, diagnose
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.parameters import FreeParameter
+from bns.diagnose.predict.paired_errors import PairedErrors
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report.text import _effects_but, _with_interval, diagnosis_text, enumerated
 from bns.diagnose.residuals import established as established_module
 from bns.diagnose.residuals.outliers import Outlier
+from bns.diagnose.residuals.symbolic import fitted
 from bns.diagnose.residuals.unexplained import Unexplained
 from bns.diagnose.select import result
 from bns.diagnose.select.result import SelectionResult, SelectionStep
@@ -89,6 +91,21 @@ def test_effects_that_predict_better_than_terms_stay_unless_their_numbers_are_no
     found = outcome._established(standing(late, "clock-offset"), late, rest)
     assert calls == [("clock-offset",), ()][:asked]
     assert found.names == (("clock-offset",) if asked == 2 else ())
+
+
+def test_an_effect_that_a_term_had_hidden_stands_though_it_lowers_no_error_without_the_term(late, monkeypatch):
+    """A turn that is not there: alone it lowers nothing, and is withdrawn where a search accepted it."""
+    nothing = standing(late)
+    problem = nothing.problem
+    term = fitted(problem, nothing.fit, "v", "k * v * abs(w)")
+    fit = problem.fit(term.fit.model.with_effect("yaw-bias", rate_rad_s=0.0))
+    found = outcome.Established(("yaw-bias",), (term,), problem, fit)
+    monkeypatch.setattr(outcome, "_established", lambda *_: found)
+    monkeypatch.setattr(outcome, "_believable", lambda *_: found)
+    monkeypatch.setattr(outcome, "_matters", lambda _: True)
+    monkeypatch.setattr(outcome, "_within_noise", lambda _: False)
+    monkeypatch.setattr(PairedErrors, "falls", False)
+    assert outcome.outcome_of(nothing, late, NOMINAL, lambda _: None).selection.accepted == ("yaw-bias",)
 
 
 def test_with_fewer_effects_nothing_competes_until_it_is_asked_for(late):
