@@ -18,11 +18,11 @@ from bns.api.common.prepared import Prepared, PreparedNetworks, prepared, prepar
 from bns.api.measurements import Log
 from bns.api.model import Given, Model
 from bns.app.switches import Switches, Term
-from bns.diagnose.adding import Memory, does_nothing
+from bns.diagnose.adding import Memory
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.cross_validation import AS_GIVEN
 from bns.diagnose.estimate.fit_set import Tried
-from bns.diagnose.estimate.plausibility import implausible
+from bns.diagnose.estimate.plausibility import does_nothing, implausible
 from bns.diagnose.estimate.problem import given_steps
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.base import Steps

@@ -17,7 +17,7 @@ from bns.diagnose.estimate.clocks.trial_clock_test import with_trial_clocks
 from bns.diagnose.estimate.cross_validation import AS_GIVEN, Judged, held_out_steps
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.fit_set import Tried, fit_set
-from bns.diagnose.estimate.plausibility import fitted_again, implausible, with_unit
+from bns.diagnose.estimate.plausibility import does_nothing, fitted_again, implausible, with_unit
 from bns.diagnose.estimate.problem import given_steps, problem_for
 from bns.diagnose.estimate.starts import fitting
 from bns.diagnose.parallel import one_thread_each
@@ -177,19 +177,13 @@ def warnings_on(fit: Fit, effects: Sequence[tuple[Effect, Mapping[str, str]]], e
         if why:
             yield f"{name} fits best with an implausible value: {why}."
         elif does_nothing(fit, name):
-            yield f"{name} has no visible effect in these data: its 95 % interval includes the neutral value (no effect)."
+            yield f"{name} has no visible effect in these data: its numbers cannot be told from the neutral ones (no effect)."
     if errors.trials < 2:
         yield "there is one trial, and the error is that of the trial to which the numbers were fitted, not of others."
         return
     for before, after in pairwise(next(iter(errors.horizons.values())).models):
         if not errors.between(before.name, after.name):
             yield f"with {after.name}, the error on held-out trials does not fall."
-
-
-def does_nothing(fit: Fit, name: str) -> bool:
-    """Whether no number of an effect can be told from neutral; a limit that is found is not infinite."""
-    own = [(fit.interval(index), number.parameter.neutral) for index, number in enumerate(fit.free) if number.effect == name]
-    return bool(own) and all(bool(low <= neutral <= high) for (low, high), neutral in own)
 
 
 def _written(model: Model, name: str, written: Mapping[str, str]) -> Model:

@@ -12,8 +12,8 @@ from bns.diagnose.data.stamps import stamp_scatter
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.data.variables import bare, label, velocity
 from bns.diagnose.estimate.cancelling import Cancelled, cancelled
-from bns.diagnose.estimate.plausibility import with_unit
-from bns.diagnose.estimate.smoothing_tracker import LAG, smoothing_tracker
+from bns.diagnose.estimate.plausibility import known_together, with_unit
+from bns.diagnose.estimate.smoothing_tracker import LATE, smoothing_tracker
 from bns.diagnose.outcome import Outcome
 from bns.diagnose.predict.horizons import IN_WORDS
 from bns.diagnose.predict.paired_errors import PairedErrors
@@ -93,7 +93,7 @@ def notes_on(
         values = ", ".join(f"{k} = {v:.4g}" for k, v in formula.values.items())
         said = f"{formula_in_words}: " if formula_in_words else ""
         yield f"A candidate term: {said}{formula.on} + {formula.term} with {values}."
-    yield from _on_terms(found, terms)
+    yield from _on_terms(found, terms, tracks)
     if hint is not None:
         more = int(np.ceil(len(tracks) * max((3.2 / max(hint.paired_comparison.z, 0.5)) ** 2 - 1, 0.5)))
         yield f"{hint.name} may be missing, but {len(tracks)} trials are too few to decide; about {more} more would decide."
@@ -105,7 +105,7 @@ def notes_on(
             )
 
 
-def _on_terms(found: Outcome, terms: Sequence[str]) -> Iterator[str]:
+def _on_terms(found: Outcome, terms: Sequence[str], tracks: Tracks) -> Iterator[str]:
     """On what no effect explains, in words; or why it is not in the extended model."""
     selection, with_terms = found.selection, found.errors_with_terms
     if with_terms is not None and with_terms.rose_in_the_end:
@@ -114,8 +114,19 @@ def _on_terms(found: Outcome, terms: Sequence[str]) -> Iterator[str]:
     yield from (f"What no listed effect explains behaves like this: {words}." for words in terms)
     if found.terms:
         yield from map(_on_cancelling, cancelled(selection.fit, found.terms[0].fit, selection.accepted))
+        yield _on_reach(tracks)
     if terms and with_terms is not None and not with_terms.falls:
         yield _NO_LOWER
+
+
+def _on_reach(tracks: Tracks) -> str:
+    """Where terms that were fitted hold: a free curve says nothing of commands that were not driven."""
+    wheels = tracks.left_m_s, tracks.right_m_s
+    low, high = min(float(w.min()) for w in wheels), max(float(w.max()) for w in wheels)
+    return (
+        f"The free terms describe what this log has driven (wheels from {low:.3g} to {high:.3g} m/s, and turns as quick as "
+        "these). Beyond that they are a guess: drive what you will ask of the model, and give it as --more."
+    )
 
 
 def _on_cancelling(each: Cancelled) -> str:
@@ -276,10 +287,11 @@ def _on_effects(selection: SelectionResult, tracks: Tracks, imitating: Sequence[
     # what an effect takes for granted may be why it seems to imitate something
     assuming = [*chain, *(known[name] for name in imitating if name in known)]
     yield from (effect.assumes for effect in assuming if effect.assumes)
-    tracker = smoothing_tracker(selection.problem, selection.fit) if LAG in names else None
+    tracker = smoothing_tracker(selection.problem, selection.fit) if names.intersection(LATE) else None
     if tracker is not None and tracker.in_words:
         yield tracker.in_words
     yield from (text for effect in chain for other, text in effect.beside.items() if other in names)
+    yield from (_on_numbers(known[name]) for name in selection.accepted if known_together(selection.fit, name))
     yield from _on_stamps(tracks, names)
     yield from _on_times(selection, tracks, names)
     per_trial_effect = selection.fit.model.per_trial_effect
@@ -292,6 +304,15 @@ def _on_effects(selection: SelectionResult, tracks: Tracks, imitating: Sequence[
         )
         if tracks.start_known:
             yield from _on_drift(per_trial_effect.effect.name, tracks.start_s, own)
+
+
+def _on_numbers(effect: Effect) -> str:
+    """On an effect of which no number is certain by itself."""
+    own = " and ".join(p.name for p in effect.parameters)
+    return (
+        f"{effect.name}: {own} are only known together. Each by itself may have any value of its interval, and the others make "
+        "up for it: do not read one alone, and do not take the sentence at its word."
+    )
 
 
 def _on_drift(name: str, start_s: Array, own_s: Array) -> Iterator[str]:

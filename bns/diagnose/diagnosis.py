@@ -132,8 +132,10 @@ class Diagnosis:
 
     @property
     def behaviour(self) -> tuple[str, ...]:
-        """What no effect explains, in clauses: as `moments`, then the terms that do not raise the error."""
-        return *self.moments, *(() if self.terms_raise_the_error else self.terms_in_words)
+        """What no effect explains, in clauses: the variable it follows most where no term stands, `moments`, terms that stand."""
+        terms = () if self.terms_raise_the_error else self.terms_in_words
+        most = self.rest.residual_dependence[:1] if not terms else ()
+        return *(p.in_words for p in most), *self.moments, *terms
 
     @property
     def moments(self) -> tuple[str, ...]:
@@ -144,7 +146,7 @@ class Diagnosis:
             return scattered
         trials = len(self.selection.problem.predictor.tracks)
         often = "the error is large at some moments, too often for accidents"
-        what = often if len(moments) >= OFTEN * trials else "something happens for a moment"
+        what = often if len(moments) >= OFTEN * trials else "the error is large for a moment"
         worst = f"in {len(moments)} of {trials} trials {what}; the worst is {moments[0].in_words}"
         return *scattered, worst, *((shared.in_words,) if shared is not None else ())
 

@@ -51,6 +51,7 @@ ORDER = (
     "turn-slip",
     "turn-slip-quadratic",
     "understeer",
+    "mass-offset",
     "side-slip",
     "caster-swing",
     "caster-drag",

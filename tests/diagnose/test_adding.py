@@ -26,7 +26,10 @@ def test_a_number_at_its_bound_that_changes_nothing_there_is_not_said_to_ask_for
 
     def said(value):
         fit = SimpleNamespace(
-            free=(FreeParameter("dead-zone", number),), values=np.array([value]), interval=lambda _: (0.0, 0.002)
+            free=(FreeParameter("dead-zone", number),),
+            values=np.array([value]),
+            covariance=np.zeros((1, 1)),
+            interval=lambda _: (0.0, 0.002),
         )
         return [one for one in warnings_on(fit, [(effect, {})], errors) if "at its bound" in one]
 

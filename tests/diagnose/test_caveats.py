@@ -158,7 +158,7 @@ def test_what_is_left_is_said_in_words():
 def test_an_offset_of_the_marker_may_be_the_robots():
     model = SimpleNamespace(per_trial_effect=None, effects=(), catalogue=all_effects)
     selection = SimpleNamespace(
-        accepted=("camera-scale", "marker-offset"), competing_models=(), steps=(), fit=SimpleNamespace(model=model)
+        accepted=("camera-scale", "marker-offset"), competing_models=(), steps=(), fit=SimpleNamespace(model=model, free=())
     )
     tracks = SimpleNamespace(extra={}, start_known=False, commands_at_poses_s=None)
     camera, marker = list(_on_effects(selection, tracks))[:2]
@@ -170,7 +170,7 @@ def test_an_offset_of_the_marker_may_be_the_robots():
 def test_what_an_effect_takes_for_granted_is_said_also_where_it_seems_to_imitate(imitating):
     model = SimpleNamespace(per_trial_effect=None, effects=(), catalogue=all_effects)
     accepted = () if imitating else ("backlash",)
-    selection = SimpleNamespace(accepted=accepted, competing_models=(), steps=(), fit=SimpleNamespace(model=model))
+    selection = SimpleNamespace(accepted=accepted, competing_models=(), steps=(), fit=SimpleNamespace(model=model, free=()))
     tracks = SimpleNamespace(extra={}, start_known=False, commands_at_poses_s=None)
     notes = list(_on_effects(selection, tracks, imitating))
     assert sum("the gears are assumed to touch in the forward direction" in note for note in notes) == 1
@@ -181,7 +181,7 @@ def test_a_lag_is_said_to_be_perhaps_the_trackers(monkeypatch, accepted, said):
     found = SmoothingTracker(tau_s=0.1, z=5.0)
     monkeypatch.setattr("bns.diagnose.caveats.smoothing_tracker", lambda problem, fit: found)
     model = SimpleNamespace(per_trial_effect=None, effects=(), catalogue=all_effects)
-    fit = SimpleNamespace(model=model)
+    fit = SimpleNamespace(model=model, free=())
     selection = SimpleNamespace(accepted=accepted, competing_models=(), steps=(), problem=None, fit=fit)
     tracks = SimpleNamespace(extra={}, start_known=False, commands_at_poses_s=None)
     assert sum(note == found.in_words for note in _on_effects(selection, tracks)) == said
@@ -207,7 +207,7 @@ def with_clocks(own_s):
     """A search that accepted nothing but clocks of trials."""
     clocks = SimpleNamespace(effect=effect_named("clock-offset"), trial_values=tuple(own_s))
     model = SimpleNamespace(per_trial_effect=clocks, effects=())
-    return SimpleNamespace(accepted=(), competing_models=(), steps=(), fit=SimpleNamespace(model=model))
+    return SimpleNamespace(accepted=(), competing_models=(), steps=(), fit=SimpleNamespace(model=model, free=()))
 
 
 def thinned(every):

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from bns.diagnose import outcome
-from bns.diagnose.adding import does_nothing, warnings_on
+from bns.diagnose.adding import warnings_on
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import Diagnosis, diagnose
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.parameters import FreeParameter
+from bns.diagnose.estimate.plausibility import does_nothing
 from bns.diagnose.predict.paired_errors import PairedErrors
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report.text import _effects_but, _with_interval, diagnosis_text, enumerated
@@ -214,7 +215,7 @@ def _no_steps():
 
 @pytest.mark.parametrize(
     ("moments", "said"),
-    [(3, "something happens for a moment"), (9, "the error is large at some moments, too often for accidents")],
+    [(3, "the error is large for a moment"), (9, "the error is large at some moments, too often for accidents")],
 )
 def test_moments_in_many_trials_are_the_rule(late, moments, said):
     outlier = next(iter(_outliers(1)))

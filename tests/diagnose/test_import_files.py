@@ -184,6 +184,14 @@ def test_rows_of_commands_alone_are_no_lost_poses():
     assert poses_lost(t, tracked) == (10, 197)
     assert poses_lost(np.arange(20.0), np.arange(20) != 7) == (1, 7)
     assert poses_lost(np.arange(20.0), np.arange(20) < 15) == (5, 15)
+    assert poses_lost(np.arange(20.0), np.arange(20) > 0) == (1, 0)
+
+
+@pytest.mark.parametrize("phase", [0.01, 0.31, 0.5, 0.9, 0.99])
+def test_a_command_before_the_first_pose_is_no_lost_pose_whenever_the_tracker_comes(phase):
+    t = np.concatenate([[0.0], phase + np.arange(20.0)])
+    assert poses_lost(t, np.arange(21) > 0)[0] == 0
+    assert poses_lost(np.concatenate([[0.0], phase + np.arange(20.0) + 1]), np.arange(21) > 0)[0] == 1
 
 
 def test_command_rows_give_no_finding(table):

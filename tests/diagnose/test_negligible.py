@@ -16,6 +16,7 @@ from bns.diagnose.estimate.parameters import FreeParameter
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.residuals import unexplained as rest_module
 from bns.diagnose.residuals.established import Established
 from bns.diagnose.residuals.symbolic import fitted
 from bns.diagnose.residuals.unexplained import NOTHING
@@ -36,6 +37,9 @@ from bns.physics.effects import effect_named
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
 TRUTH = {"wheelbase": {"factor": 1.05}, "wheel_mismatch": {"ratio": 1.004}, "clock_offset": {"offset_s": -5e-4}}
+
+RISING = SimpleNamespace(rose_in_the_end=("trial",))
+"""Errors with terms that are said to rise; what stands is decided elsewhere."""
 
 
 @cache
@@ -126,14 +130,14 @@ def test_effects_give_way_only_to_terms_that_matter(monkeypatch, matters, named)
     searched = selected("wheelbase", "wheel-mismatch")
     found = Established(("wheelbase",), ("a term",), searched.problem, searched.fit)
     monkeypatch.setattr(outcome, "_established", lambda *_: found)
-    monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: "errors")
+    monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: RISING)
     monkeypatch.setattr(outcome, "_believable", lambda found, *_: found)
     monkeypatch.setattr(outcome, "_matters", lambda _: matters)
     monkeypatch.setattr(outcome, "unexplained", lambda *_: NOTHING)
     ended = outcome.outcome_of(searched, predictor(), NOMINAL, lambda _: None)
     assert ended.selection.accepted == named
     assert ended.imitating == (("wheel-mismatch",) if matters else ())
-    assert (ended.terms, ended.errors_with_terms) == ((("a term",), "errors") if matters else ((), None))
+    assert (ended.terms, ended.errors_with_terms) == ((("a term",), RISING) if matters else ((), None))
 
 
 @pytest.mark.parametrize("matters", [True, False])
@@ -143,7 +147,7 @@ def test_what_terms_describe_wholly_counts_only_if_it_matters(monkeypatch, matte
     found = Established(("wheelbase",), ("a term",), searched.problem, "fit with the term")
     left = replace(NOTHING, residual_dependence=("something",))
     monkeypatch.setattr(outcome, "_established", lambda *_: found)
-    monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: "errors")
+    monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: RISING)
     monkeypatch.setattr(outcome, "_believable", lambda found, *_: found)
     monkeypatch.setattr(outcome, "_matters", lambda _: matters)
     monkeypatch.setattr(outcome, "residual_dependence", lambda *_: [])
@@ -158,6 +162,23 @@ def test_what_terms_describe_wholly_counts_only_if_it_matters(monkeypatch, matte
         assert next(said).startswith("What is left is certain but slight: slower for two seconds.")
 
 
+@pytest.mark.parametrize("rises", [(), ("trial",)])
+def test_moments_that_a_term_describes_are_none_unless_it_is_rejected(monkeypatch, rises):
+    """With mocked parts: moments stand out beside the effect, and none does beside the term."""
+    searched = selected("wheelbase")
+    found = Established(("wheelbase",), ("a term",), searched.problem, "fit with the term")
+    left = replace(NOTHING, outliers=("a moment",), shared="what it shares")
+    monkeypatch.setattr(outcome, "_established", lambda *_: found)
+    monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: SimpleNamespace(rose_in_the_end=rises))
+    monkeypatch.setattr(outcome, "_believable", lambda found, *_: found)
+    monkeypatch.setattr(outcome, "_matters", lambda _: True)
+    monkeypatch.setattr(outcome, "unexplained", lambda *_: left)
+    monkeypatch.setattr(rest_module, "judged_windows", lambda _, fit: fit)
+    monkeypatch.setattr(rest_module, "outliers", lambda _, fit, windows: [] if fit == windows == found.fit else ["a moment"])
+    ended = outcome.outcome_of(searched, predictor(), NOMINAL, lambda _: None)
+    assert (ended.rest.outliers, ended.rest.shared) == ((("a moment",), "what it shares") if rises else ((), None))
+
+
 @pytest.mark.parametrize("better", [True, False])
 def test_what_is_below_the_noise_counts_where_a_curve_does_better_than_the_effects_that_imitate_it(monkeypatch, better):
     """With mocked parts: two effects leave something that is slight; a term that has none of them beside it leaves nothing."""
@@ -166,7 +187,7 @@ def test_what_is_below_the_noise_counts_where_a_curve_does_better_than_the_effec
     left = replace(NOTHING, residual_dependence=("something",))
     asked = []
     monkeypatch.setattr(outcome, "_established", lambda *_: found)
-    monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: "errors")
+    monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: RISING)
     monkeypatch.setattr(outcome, "_believable", lambda found, *_: found)
     monkeypatch.setattr(outcome, "_matters", lambda _: True)
     monkeypatch.setattr(outcome, "_within_noise", lambda _: True)

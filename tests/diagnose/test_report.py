@@ -120,7 +120,7 @@ def test_moments_that_stand_out_are_on_the_first_screen(tmp_path):
     data, out = tmp_path / "held.csv", tmp_path / "held.html"
     write_measurements(held_from(measured(NOMINAL, trials=40, seed=2), {3: 0.05, 17: 0.05, 22: 0.9, 31: 0.9}), data)
     assert main(["report", str(data), "--model", "khepera", "--minutes", "2", "-o", str(out)]) == 0
-    assert re.search(r"In 4 of 40 trials something happens for a moment; the worst is trial \d+ at", first_screen(out))
+    assert re.search(r"In 4 of 40 trials the error is large for a moment; the worst is trial \d+ at", first_screen(out))
 
 
 def test_a_trial_that_begins_at_a_mistaken_marker_is_shown_last():

@@ -88,6 +88,18 @@ def test_what_stands_beside_the_lag_for_curves_goes_with_it():
     assert found.tau_s == pytest.approx(TAU_S, rel=0.03)
 
 
+def test_a_filter_is_told_from_a_late_clock_that_was_named_in_its_place():
+    predictor = WheelPredictor(tracks_of(log(tracker_s=TAU_S)))
+    problem = problem_for(predictor, Model(wheelbase_m=BASE_M))
+    fit = fit_with(problem, problem.fit(Model(wheelbase_m=BASE_M)), effect_named("clock-offset"))
+    problem = problem_for(predictor, fit.model)
+    found = smoothing_tracker(problem, problem.fit(fit.model))
+    assert found.instead_of == ("clock-offset",)
+    assert found.tau_s == pytest.approx(TAU_S, rel=0.05)
+    assert found.z > 4
+    assert "fits this log better than this effect, by" in found.in_words
+
+
 def test_a_model_without_a_lag_has_no_alternative():
     predictor = WheelPredictor(tracks_of(log(trials=4)))
     problem = problem_for(predictor, Model(wheelbase_m=BASE_M))

@@ -7,14 +7,14 @@ import pandas as pd
 import pytest
 
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.diagnosis import Diagnosis, diagnose
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.significance import PairedComparison
 from bns.diagnose.predict.wheels import RECENT_S, WheelPredictor
 from bns.diagnose.residuals.along_variables import SHARE, ResidualDependence, probe_effect, significant_dependence
 from bns.diagnose.residuals.autocorrelation import Autocorrelation, _moves, _period
-from bns.diagnose.residuals.outliers import FAR, TRIALS, WIDTH, _windows, outliers
-from bns.diagnose.residuals.unexplained import unexplained
+from bns.diagnose.residuals.outliers import FAR, TRIALS, WIDTH, _windows, moment_at, outliers
+from bns.diagnose.residuals.unexplained import NOTHING, unexplained
 from tests.diagnose.worlds import FRAME_S, NOMINAL, measured
 
 KICK_S, KICK_RAD = 1.6, 0.15
@@ -264,3 +264,24 @@ def test_a_share_of_the_motion_scales_ways_and_turns_alike():
 def test_a_pattern_must_be_earned_in_many_trials_and_large(se, chance, share, stays):
     found = ResidualDependence("speed_m_s", "yaw_rad_s", PairedComparison(1.0, se, chance), share)
     assert significant_dependence([found]) == ([found] if stays else [])
+
+
+def test_what_is_left_follows_a_variable_in_words():
+    along = ResidualDependence("time_in_command_s", SHARE, PairedComparison(1.0, 0.1, 1e-5), 0.115)
+    said = "the error of the whole motion follows time in the command: a free curve along it removes 11.5% of the loss"
+    assert along.in_words == said
+    only = Diagnosis("unlisted", None, rest=replace(NOTHING, residual_dependence=(along, along)))
+    assert only.behaviour == (said,)
+
+
+def test_a_moment_that_begins_and_ends_where_it_is_predicted_says_how_far_the_track_strayed():
+    table = measured(NOMINAL, trials=1, seed=3, noise=(1e-6, 1e-6), jitter=0.0)
+    table.loc[30:31, "y_m"] += 0.017
+    predictor = WheelPredictor(tracks_of(table))
+    problem = problem_for(predictor, NOMINAL)
+    fit = problem.fit(NOMINAL)
+    within, at_end = moment_at(problem, fit, 26, 9.0), moment_at(problem, fit, 31 - WIDTH + 1, 9.0)
+    assert within.strayed_m == pytest.approx(0.017, abs=1e-4)
+    assert within.in_words.endswith("°, but up to 17 mm from where it was predicted on the way")
+    assert at_end.strayed_m == pytest.approx(0.017, abs=1e-4)
+    assert "on the way" not in at_end.in_words

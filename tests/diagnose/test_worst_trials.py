@@ -108,7 +108,7 @@ def test_the_worst_trials_hide_the_next_ones_and_together_they_count():
     assert {o.trial for o in found.rest.outliers} == {"3", "17", "22", "31"}
     worst = found.rest.outliers[0]
     assert worst.moved_m < 0.01 < worst.predicted_m
-    assert found.behaviour[0].startswith("in 4 of 40 trials something happens for a moment")
+    assert found.behaviour[0].startswith("in 4 of 40 trials the error is large for a moment")
     assert worst.in_words in found.behaviour[0]
     assert f"It behaves like this: {found.behaviour[0]}." in diagnosis_text(found)
 

@@ -44,6 +44,29 @@ class ForceLimit(Cause):
 
 
 @dataclass
+class MassOffset(Cause):
+    """A body whose centre of mass lies off the axle, between stiff springs of speed: forces in small parts of a step."""
+
+    lead_m_s: float
+    stiff_s = 2e-3
+
+    def body(self, body: Body, moment: Moment) -> Body:
+        small_s = moment.step_s / FINE
+        ahead, against = self.lead_m_s / self.stiff_s, 4 * self.lead_m_s / BASE_M**2 / self.stiff_s
+        v, w = np.zeros_like(body.forward[:, 0]), np.zeros_like(body.turn[:, 0])
+        forward, turn = np.empty_like(body.forward), np.empty_like(body.turn)
+        for i in range(forward.shape[1]):
+            way = angle = 0.0
+            for _ in range(FINE):
+                pull = (body.forward[:, i] - v) / self.stiff_s + ahead * w**2
+                twist = (body.turn[:, i] - w) / self.stiff_s - against * v * w
+                v, w = v + pull * small_s, w + twist * small_s
+                way, angle = way + v * small_s, angle + w * small_s
+            forward[:, i], turn[:, i] = way / moment.step_s, angle / moment.step_s
+        return body._replace(forward=forward, turn=turn)
+
+
+@dataclass
 class VelocityRamp(Cause):
     """A drive that approaches commanded velocity and turn rate in small parts of a step, none larger than its limits allow."""
 

@@ -98,6 +98,7 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
         {"tau_s": 0.064, "lead_s": 0.0, "swing_s": 0.053, "turn_ratio": 1.0},
         {"tau_s": 0.04, "lead_s": 0.1, "swing_s": 0.12, "turn_ratio": 0.5},
     ),
+    "mass-offset": ({"lead_m_s": 0.0006}, {"lead_m_s": -0.0015}),
 }
 """Medium and strong, of the Khepera."""
 BESIDE: dict[str, dict[str, Parameters]] = {"wheel-diameters": {"acceleration-limit": {"max_m_s2": 0.25}}}
@@ -118,6 +119,7 @@ TURNING = {
     "caster-swing",
     "dead-band",
     "gear-friction",
+    "mass-offset",
     "reversal-pause",
     "reverse-gain",
     "sliding-contact",

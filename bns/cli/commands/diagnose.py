@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from bns.api.common.progress import Progress
     from bns.api.diagnose import DiagnoseResult
     from bns.api.measurements import Measurements
-    from bns.api.model import Given, Model
+    from bns.api.model import Given
 
 SAYS_LITTLE = 0.03
 """A share so small says nothing yet of how long the whole takes."""
@@ -239,7 +239,7 @@ def diagnose(options: argparse.Namespace) -> int:
         extended.save(options.output)
     print(json.dumps(found.to_json()) if options.json else found.summary(words_of(options)))
     if not options.json:
-        print(_where_written(options, extended), end="")
+        print(_where_written(options, found), end="")
 
     def draw(folder: Path) -> Iterator[Path]:
         from bns.diagnose.report.figures import diagnosis_figure
@@ -251,12 +251,23 @@ def diagnose(options: argparse.Namespace) -> int:
     return 0
 
 
-def _where_written(options: argparse.Namespace, extended: Model | None) -> str:
+def _which(found: DiagnoseResult) -> str:
+    """Which of several explanations a model has that was written."""
+    if not found.diagnosis.selection or not found.diagnosis.selection.competing_models:
+        return ""
+    return (
+        f"\nOf the explanations that cannot be told apart it has the first: {', '.join(found.effects)}. For another one, name "
+        "its effects to `bns add`."
+    )
+
+
+def _where_written(options: argparse.Namespace, found: DiagnoseResult) -> str:
     """Where the model with all that was found is, or how to have it written; "" if nothing was found and nothing asked for."""
+    extended = found.extended
     if options.output is not None:
         if extended is None:
             return f"\nNothing was found to add, so {options.output} was not written.\n"
-        return f"\n{_written(options)}\n"
+        return f"\n{_written(options)}{_which(found)}\n"
     if extended is None:
         return ""
     return f"\nTo write the model with all this: {shlex.join(['bns', *options.command_line, '-o', 'extended.yaml'])}\n"

@@ -348,7 +348,7 @@ def _losses(t_s: np.ndarray, tracked: np.ndarray) -> tuple[np.ndarray, np.ndarra
     at = np.flatnonzero(tracked)
     usual = float(np.median(np.diff(t_s[at])))
     marks = np.concatenate([[-1], at, [len(t_s)]])
-    most = 0.6 * usual  # before the first and after the last pose one is due only where nearly a whole interval passes
+    most = 0.501 * usual  # before the first and after the last pose one is due only where a whole interval passes
     times = np.concatenate([[t_s[0] - most], t_s[at], [t_s[-1] + most]])
     due = np.maximum(np.round(np.diff(times) / usual) - 1, 0)
     return np.minimum(np.diff(marks) - 1, due).astype(int), marks

@@ -27,6 +27,7 @@ from bns.diagnose.design.sequences import Arena, Sequences
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.noise import huber
 from bns.diagnose.estimate.problem import problem_with_noise
+from bns.diagnose.estimate.pseudo_inverse import pseudo_inverse
 from bns.physics.model import Model
 
 Pair = tuple[int, int]
@@ -174,7 +175,7 @@ def curvature_of(fit: Fit) -> Array:
     known = size > 0
     out = np.zeros_like(fit.covariance)
     keep = np.ix_(known, known)
-    out[keep] = np.linalg.pinv(fit.covariance[keep], hermitian=True)
+    out[keep] = pseudo_inverse(fit.covariance[keep])
     loose = np.einsum("kcp,kcp->p", fit.jacobian, fit.jacobian)
     out[~known, ~known] = 1e9 * np.maximum(loose[~known], 1.0)
     return out

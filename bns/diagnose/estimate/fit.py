@@ -27,6 +27,7 @@ from bns.diagnose.estimate.normal_equations import (
     normal_equations_by_trial,
 )
 from bns.diagnose.estimate.parameters import FreeParameter, active_mask, increment, increments, moved_by
+from bns.diagnose.estimate.pseudo_inverse import pseudo_inverse
 from bns.diagnose.estimate.significance import PairedComparison, chance, jackknife_covariance, paired_elpd_diff
 from bns.diagnose.predict.base import Predictor, Steps
 from bns.diagnose.settings import DEFAULTS
@@ -271,7 +272,7 @@ class Problem:
             others = (total - curvatures)[:, active][:, :, active]
             # without this trial the others' gradients no longer cancel: they sum to minus this one's
             of_others = (gradients - gradients.sum(axis=0))[:, active]
-            steps[:, active] = (np.linalg.pinv(others) @ of_others[..., None])[..., 0]
+            steps[:, active] = (pseudo_inverse(others) @ of_others[..., None])[..., 0]
             covariance[np.ix_(active, active)] = jackknife_covariance(steps[:, active])
         held_out = self.per_trial(huber(innovations_after(self.predictor.tracks.first, jacobian, whitened, steps)))
         values = np.array([f.of(model) for f in free])
@@ -388,5 +389,4 @@ def _damped_step(curvature: Array, gradient: Array, damping: float) -> Array:
         return np.zeros(0)
     scale = np.diag(curvature).copy()
     scale[scale <= 0] = 1.0
-    solved = np.linalg.lstsq(curvature + damping * np.diag(scale), gradient, rcond=None)[0]
-    return np.asarray(-solved, dtype=np.float64)
+    return np.asarray(-pseudo_inverse(curvature + damping * np.diag(scale)) @ gradient, dtype=np.float64)

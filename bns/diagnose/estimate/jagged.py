@@ -17,6 +17,7 @@ from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.noise import huber
 from bns.diagnose.estimate.parameters import increment, moved_by
+from bns.diagnose.estimate.pseudo_inverse import pseudo_inverse
 from bns.diagnose.settings import DEFAULTS
 
 _POINTS = DEFAULTS.estimate.jagged_points
@@ -58,7 +59,7 @@ def _best_of_others(problem: Problem, fit: Fit, j: int) -> Array:
     by_trial = problem.normal_equations(fit.jacobian, fit.whitened)
     curvature, gradient = by_trial.curvatures.sum(axis=0), by_trial.gradients.sum(axis=0)
     curvature[j], curvature[:, j], gradient[j] = 0.0, 0.0, 0.0
-    out: Array = -np.linalg.pinv(curvature, hermitian=True) @ gradient
+    out: Array = -pseudo_inverse(curvature) @ gradient
     return out
 
 
@@ -68,7 +69,7 @@ def _followed(problem: Problem, fit: Fit, j: int) -> Array:
     others = np.arange(len(fit.free)) != j
     way = np.zeros(len(fit.free))
     way[j] = 1.0
-    way[others] = -np.linalg.pinv(curvature[np.ix_(others, others)], hermitian=True) @ curvature[others, j]
+    way[others] = -pseudo_inverse(curvature[np.ix_(others, others)]) @ curvature[others, j]
     return way
 
 

@@ -9,6 +9,7 @@ from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.normal_equations import normal_equations
 from bns.diagnose.estimate.parameters import moved_by
 from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.estimate.pseudo_inverse import pseudo_inverse
 from bns.diagnose.settings import DEFAULTS
 
 LOST = DEFAULTS.estimate.lacking_lost
@@ -45,5 +46,5 @@ def _taken_over(fit: Fit, name: str) -> tuple[Array | None, float]:
         return None, 0.0
     curvature, _ = normal_equations(fit.jacobian, fit.whitened)
     shared, away = curvature[~own][:, own] @ away[own], away[own]
-    others = -np.linalg.lstsq(curvature[~own][:, ~own], shared, rcond=None)[0]
+    others = -pseudo_inverse(curvature[~own][:, ~own]) @ shared
     return others, float(away @ curvature[own][:, own] @ away + others @ shared) / 2.0

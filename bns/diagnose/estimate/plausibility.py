@@ -5,10 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.special import fdtrc
 
 from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.pseudo_inverse import pseudo_inverse
+from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Parameter
 from bns.physics.model import Model
+
+CHANCE = DEFAULTS.estimate.together_chance
 
 
 def at_bound(fit: Fit, name: str) -> bool:
@@ -50,6 +55,32 @@ def undetermined(fit: Fit, name: str) -> str:
 def limiting(fit: Fit, name: str) -> bool:
     """Whether a number of an effect may be anything, so that the effect does the work of a shorter one."""
     return any(_spans(fit, i) for i, number in enumerate(fit.free) if number.effect == name)
+
+
+def does_nothing(fit: Fit, name: str) -> bool:
+    """Whether the numbers of an effect, all together, cannot be told from neutral; a limit that is found is not infinite."""
+    return _each_may_be_neutral(fit, name) and not _apart_together(fit, name)
+
+
+def known_together(fit: Fit, name: str) -> bool:
+    """Whether no number of an effect by itself can be told from neutral, but all of them together can."""
+    return _each_may_be_neutral(fit, name) and _apart_together(fit, name)
+
+
+def _each_may_be_neutral(fit: Fit, name: str) -> bool:
+    own = [(fit.interval(index), number.parameter.neutral) for index, number in enumerate(fit.free) if number.effect == name]
+    return bool(own) and all(bool(low <= neutral <= high) for (low, high), neutral in own)
+
+
+def _apart_together(fit: Fit, name: str) -> bool:
+    """Wald's test of all numbers of an effect at once, at 5 %: F with as many degrees of freedom as there are trials to spare."""
+    away = {i: fit.values[i] - f.parameter.neutral for i, f in enumerate(fit.free) if f.effect == name}
+    own = [i for i, by in away.items() if np.isfinite(by) and fit.covariance[i, i] > 0]
+    if not own:
+        return False
+    by = np.array([away[i] for i in own])
+    statistic = float(by @ pseudo_inverse(fit.covariance[np.ix_(own, own)]) @ by) / len(own)
+    return bool(fdtrc(len(own), max(len(fit.losses) - len(fit.free), 1), statistic) < CHANCE)
 
 
 def _spans(fit: Fit, index: int) -> bool:

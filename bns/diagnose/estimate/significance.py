@@ -10,6 +10,7 @@ import numpy as np
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.normal_equations import NormalEquations
+from bns.diagnose.estimate.pseudo_inverse import pseudo_inverse
 from bns.diagnose.settings import DEFAULTS
 
 FLIPS = DEFAULTS.estimate.flips
@@ -51,7 +52,7 @@ def sign_flip_p(scores: Array, curvature: Array) -> float:
     likely to pull the other way: the statistic g' H^-1 g of the sum g is compared with itself with the signs of
     whole trials drawn by lot. Exact whatever the scatter inside and between trials, heavy tails included.
     """
-    sizes, directions = np.linalg.eigh(np.linalg.pinv(curvature, hermitian=True))
+    sizes, directions = np.linalg.eigh(pseudo_inverse(curvature))
     apart = scores @ (directions * np.sqrt(np.maximum(sizes, 0.0)))  # in these the statistic is a plain sum of squares
     observed = float((apart.sum(axis=0) ** 2).sum())
     if not np.isfinite(observed) or observed <= 0:
@@ -80,10 +81,7 @@ def chance(joint: NormalEquations, base_numbers: int) -> float:
     What these could do as well is taken out of the others first.
     """
     scores, curvature = joint.gradients, joint.curvatures.sum(axis=0)
-    shared = (
-        np.linalg.pinv(curvature[:base_numbers, :base_numbers], hermitian=True)
-        @ curvature[:base_numbers, base_numbers:]
-    )
+    shared = pseudo_inverse(curvature[:base_numbers, :base_numbers]) @ curvature[:base_numbers, base_numbers:]
     left = curvature[base_numbers:, base_numbers:] - curvature[base_numbers:, :base_numbers] @ shared
     return sign_flip_p(scores[:, base_numbers:] - scores[:, :base_numbers] @ shared, left)
 

@@ -2,7 +2,7 @@
 
 A first-order low-pass filter of the poses delays all motion as a lag of both wheels does, and shortens curves besides: by half of
 the squared product of turn rate and time constant, so that turns tell the two apart. No effect of the catalogue is a filter of
-the tracker's, so it is compared here with a lag that was found.
+the tracker's, so it is compared here with a lag that was found, or with what stands in its place.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ from bns.diagnose.settings import DEFAULTS
 from bns.physics.model import Model
 
 LAG = "motor-lag"
+LATE = {LAG: "tau_s", "controller-overshoot": "swing_s", "command-delay": "delay_s", "clock-offset": "offset_s"}
+"""Effects that make all motion late, the most alike first, and how much."""
 CURVES = ("turn-slip", "turn-slip-quadratic", "clock-offset")
 """Effects that may stand beside a lag for what a filter does in curves, and for when it begins."""
 _WITHIN = DEFAULTS.estimate.smoothing_within
@@ -40,29 +42,32 @@ class SmoothingTracker:
         """What to say of a lag that was found; "" where the tracks speak for it."""
         if self.z < -MIN_Z:
             return ""
-        effects, many = " and ".join(self.instead_of), len(self.instead_of) > 1
+        effects = " and ".join(self.instead_of)
+        alone = "motors that lag" if self.instead_of == (LAG,) else "this effect"
+        others = "these effects" if len(self.instead_of) > 1 else alone
         tracker = f"a tracker that smooths its poses (a low-pass filter with a time constant of {1e3 * self.tau_s:.0f} ms)"
         known = "Ask whether yours does, and compare with raw poses or with the wheels' own speeds."
         if self.z <= MIN_Z:
-            return f"{effects}: {tracker} fits this log as well as {'these effects' if many else 'motors that lag'}. {known}"
+            return f"{effects}: {tracker} fits this log as well as {others}. {known}"
         return (
-            f"{effects}: {tracker} fits this log better than {'these effects' if many else 'motors that lag'}, by {self.z:.1f} "
-            f"standard errors: it shortens curves, too. {known}"
+            f"{effects}: {tracker} fits this log better than {others}, by {self.z:.1f} standard errors: it shortens curves, too. "
+            f"{known}"
         )
 
 
 def smoothing_tracker(problem: Problem, fit: Fit) -> SmoothingTracker | None:
-    """The alternative to the lag of a fitted model; None where the model has none, or its robot no wheels."""
+    """The alternative to what makes a fitted model late; None where nothing does, or its robot has no wheels."""
     predictor, own = problem.predictor, [a.effect.name for a in fit.model.effects if not a.per_trial]
-    if not isinstance(predictor, WheelPredictor) or predictor.tracks.relative or LAG not in own:
+    late = next((name for name in LATE if name in own), "")
+    if not isinstance(predictor, WheelPredictor) or predictor.tracks.relative or not late:
         return None
-    lag_s = fit.model.values_of(LAG)["tau_s"]
+    lag_s = fit.model.values_of(late)[LATE[late]]
     if not lag_s > 0.0:
         return None
-    bare = fit.model.without(LAG)
-    imitated = tuple(name for name in own if name in CURVES)
+    bare = fit.model.without(late)
+    imitated = tuple(name for name in own if name in CURVES and name != late)
     tried = [(), imitated] if imitated else [()]
-    found = [((LAG, *names), *_best(problem, predictor, reduce(Model.without, names, bare), lag_s)) for names in tried]
+    found = [((late, *names), *_best(problem, predictor, reduce(Model.without, names, bare), lag_s)) for names in tried]
     instead_of, tau_s, losses = min(found, key=lambda one: float(one[2].sum()))
     gain, se = paired_elpd_diff(fit.losses, losses)
     return SmoothingTracker(tau_s, gain / se if se > 0 else 0.0, instead_of)

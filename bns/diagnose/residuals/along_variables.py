@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bns.diagnose.data.tracks import Array
+from bns.diagnose.data.variables import bare, label, velocity
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.noise import huber
 from bns.diagnose.estimate.normal_equations import NormalEquations, innovations_after, normal_equations
@@ -44,6 +45,12 @@ class ResidualDependence:
     channel: str
     paired_comparison: PairedComparison
     share: float
+
+    @property
+    def in_words(self) -> str:
+        """In a clause."""
+        what, along = bare(velocity(self.channel)), bare(label(self.variable))
+        return f"the error of {what} follows {along}: a free curve along it removes {self.share:.1%} of the loss"
 
 
 def residual_dependence(problem: Problem, fit: Fit) -> list[ResidualDependence]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem
@@ -19,6 +20,7 @@ from bns.diagnose.estimate.noise import weights
 from bns.diagnose.estimate.significance import MIN_Z, PairedComparison, paired_elpd_diff
 from bns.diagnose.parallel import each
 from bns.diagnose.predict.base import Predictor
+from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.along_variables import with_columns
 from bns.diagnose.residuals.symbolic import PROBE
 from bns.diagnose.settings import DEFAULTS
@@ -65,6 +67,7 @@ TIME_KNOTS = DEFAULTS.residuals.time_knots
 REVERSAL_KNOTS = DEFAULTS.residuals.reversal_knots
 RESPONSE_KNOTS_S = DEFAULTS.residuals.response_knots_s
 SURFACE_KNOTS = DEFAULTS.residuals.surface_knots
+SURFACE_DRIVEN = DEFAULTS.residuals.surface_driven
 SWING_KNOTS = DEFAULTS.residuals.swing_knots
 STRAIGHT_AT, STRAIGHT_WITHIN = DEFAULTS.residuals.straight_within
 STRAIGHT_SHARE = DEFAULTS.residuals.straight_share
@@ -99,9 +102,9 @@ class Earned:
 
 def families(predictor: Predictor, wheelbase_m: float, response: bool = True) -> list[Family]:
     """All families that these tracks can speak of; `RESPONSE` only where asked for: it can imitate every effect that is late."""
-    seen = predictor.variables()
-    if "left_m_s" not in seen:
+    if not isinstance(predictor, WheelPredictor):
         return []
+    seen = predictor.variables()
     wheels = np.concatenate([seen["left_m_s"].ravel(), seen["right_m_s"].ravel()])
     reverses, knots = bool((wheels < 0.0).any()), [share * float(np.abs(wheels).max()) for share in SPEED_KNOTS]
     of_speed, by_direction = _of_speed(knots, reverses), _by_direction(knots)
@@ -111,7 +114,7 @@ def families(predictor: Predictor, wheelbase_m: float, response: bool = True) ->
         Family("speed and turn", "v", ("v * w", "v * w**2", "v * abs(v)", "v**3", "moving * abs(w)")),
         Family("speed and turn", "w", ("w * abs(w)", "w * abs(v)", "w**3", "w * v**2", "w * v", "v * abs(w)")),
         Family("speed and turn", "s", ("v * w * abs(w)", "v * w * abs(v)", "w")),
-        *_surfaces(seen, wheelbase_m),
+        *_surfaces(seen, predictor.grid.step_s, wheelbase_m),
         Family("side of the turn", "v", ("v * max(w, 0)", "v * min(w, 0)", "moving * max(w, 0)", "moving * min(w, 0)")),
     ]
     if not predictor.tracks.relative:
@@ -141,16 +144,41 @@ def _by_direction(knots: Sequence[float]) -> tuple[str, ...]:
     return tuple(hat for ahead in ("u", "-u") for hat in _hats(f"({ahead})", knots)[1:])
 
 
-def _surfaces(seen: dict[str, Array], wheelbase_m: float) -> Iterator[Family]:
-    """Free surfaces over speed and turn: limits of grip and the like, which no polynomial follows."""
-    left, right = seen["left_m_s"], seen["right_m_s"]
-    fastest, sharpest = float(np.abs(left + right).max()) / 2, float(np.abs(right - left).max()) / wheelbase_m
-    speeds = _hats("abs(v)", [share * fastest for share in SURFACE_KNOTS[0]])
-    turns = _hats("abs(w)", [share * sharpest for share in SURFACE_KNOTS[1]])
-    if fastest > 0.0 and sharpest > 0.0:
-        yield Family(SURFACE, "w", tuple(f"sign(w) * {v} * {w}" for v in speeds for w in turns[1:]))
-        yield Family(SURFACE, "v", tuple(f"sign(v) * {v} * {w}" for v in speeds[1:] for w in turns))
-        yield Family(SURFACE, SHARE, tuple(f"{v} * {w}" for v in speeds for w in turns))
+def _surfaces(seen: dict[str, Array], lasted_s: Array, wheelbase_m: float) -> Iterator[Family]:
+    """Free surfaces over speed and turn: limits of grip and the like, which no polynomial follows.
+
+    ``lasted_s``: how long each of what was ``seen`` lasted. A knot near which the robot hardly drove has the number of the
+    nearest knot near which it did: one of its own would draw out to there whatever slope is found at the edge of what was driven.
+    """
+    v, w = np.abs(seen["left_m_s"] + seen["right_m_s"]) / 2, np.abs(seen["right_m_s"] - seen["left_m_s"]) / wheelbase_m
+    if not (v.any() and w.any()):
+        return
+    at = [[share * float(own.max()) for share in shares] for own, shares in zip((v, w), SURFACE_KNOTS, strict=True)]
+    near = [_nearest(own, knots) for own, knots in zip((v, w), at, strict=True)]
+    driven = np.zeros((len(at[0]), len(at[1])))
+    np.add.at(driven, tuple(near), lasted_s)
+    known = driven >= SURFACE_DRIVEN * driven.sum()
+    speeds, turns = _hats("abs(v)", at[0]), _hats("abs(w)", at[1])
+    for on, sign, least in (("w", "sign(w) * ", (0, 1)), ("v", "sign(v) * ", (1, 0)), (SHARE, "", (0, 0))):
+        parts: dict[tuple[int, int], list[str]] = {}
+        for knot in np.ndindex(*known.shape):
+            if knot[0] >= least[0] and knot[1] >= least[1]:
+                for to in _known_near(known, knot, least):
+                    parts.setdefault(to, []).append(f"{speeds[knot[0]]} * {turns[knot[1]]}")
+        sums = [one[0] if len(one) == 1 else f"({' + '.join(one)})" for one in parts.values()]
+        if sums:
+            yield Family(SURFACE, on, tuple(sign + one for one in sums))
+
+
+def _nearest(values: Array, knots: Sequence[float]) -> NDArray[np.int64]:
+    """Which knot each value is nearest to."""
+    return np.asarray(np.searchsorted([(a + b) / 2 for a, b in pairwise(knots)], values))
+
+
+def _known_near(known: NDArray[np.bool_], knot: tuple[int, int], least: tuple[int, int]) -> list[tuple[int, int]]:
+    """The knot itself, or the nearest that is known, none below ``least``; of equally near ones the slowest. Empty if none is."""
+    there = [one for one in np.ndindex(*known.shape) if known[one] and one[0] >= least[0] and one[1] >= least[1]]
+    return sorted(there, key=lambda one: (abs(one[0] - knot[0]) + abs(one[1] - knot[1]), one))[:1]
 
 
 def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float) -> Iterator[Family]:

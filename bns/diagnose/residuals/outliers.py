@@ -51,6 +51,8 @@ class Outlier:
     turned_rad: float
     predicted_m: float
     predicted_rad: float
+    strayed_m: float = 0.0
+    """How far it came from where it was predicted, at any frame of the window."""
 
     @property
     def in_words(self) -> str:
@@ -61,9 +63,12 @@ class Outlier:
     def when(self) -> str:
         """The same, without the trial."""
         turned, predicted = (round(np.degrees(angle)) for angle in (self.turned_rad, self.predicted_rad))
+        moved, expected = f"{1e3 * self.moved_m:.0f} mm", f"{1e3 * self.predicted_m:.0f} mm"
+        alike = (moved, turned) == (expected, predicted)
+        between = f", but up to {1e3 * self.strayed_m:.0f} mm from where it was predicted on the way" if alike else ""
         return (
-            f"at {self.t_s:.2f} s, near ({self.x_m:.2f}, {self.y_m:.2f}) m: moved {1e3 * self.moved_m:.0f} mm "
-            f"and turned {turned}° in {self.lasted_s:.2f} s, predicted {1e3 * self.predicted_m:.0f} mm and {predicted}°"
+            f"at {self.t_s:.2f} s, near ({self.x_m:.2f}, {self.y_m:.2f}) m: moved {moved} and turned {turned}° in "
+            f"{self.lasted_s:.2f} s, predicted {expected} and {predicted}°{between}"
         )
 
 
@@ -107,7 +112,9 @@ def outliers(problem: Problem, fit: Fit, judged: JudgedWindows | None = None) ->
 def moment_at(problem: Problem, fit: Fit, start: int, size: float) -> Outlier:
     """The window that begins with this frame."""
     tracks, begin, end = problem.predictor.tracks, start - 1, start + WIDTH - 1
-    driven, off = (way[0] for way in ways(problem, fit, np.array([begin]), np.array([end])))
+    ends = np.arange(begin + 1, end + 1)
+    every, strayed = ways(problem, fit, np.full(len(ends), begin), ends)
+    driven, off = every[-1], strayed[-1]
     way, turned = np.hypot(*(driven + off)[:2]), driven[2] + off[2]
     x, y, _ = tracks.pose[begin]
     return Outlier(
@@ -115,7 +122,7 @@ def moment_at(problem: Problem, fit: Fit, start: int, size: float) -> Outlier:
         float(tracks.own_s[start]),
         size,
         float(tracks.own_s[end] - tracks.own_s[begin]),
-        *(float(v) for v in (x, y, way, turned, np.hypot(*driven[:2]), driven[2])),
+        *(float(v) for v in (x, y, way, turned, np.hypot(*driven[:2]), driven[2], np.hypot(*strayed.T[:2]).max())),
     )
 
 

@@ -6,7 +6,7 @@ Each sees faults that the others miss, and each has a least size, since honest r
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.residuals.along_variables import ResidualDependence, significant_dependence
@@ -40,12 +40,24 @@ NOTHING = Unexplained((), None, ())
 
 def unexplained(problem: Problem, fit: Fit, seen: Sequence[ResidualDependence]) -> Unexplained:
     """Of the patterns ``seen`` in a fitted model, and of its innovations, what is too large and too certain to be luck."""
-    largest, windows = autocorrelations(problem, fit)[0], judged_windows(problem, fit)
-    moments = tuple(outliers(problem, fit, windows))
+    largest = autocorrelations(problem, fit)[0]
+    moments, shared = _moments(problem, fit)
     return Unexplained(
         tuple(significant_dependence(list(seen))),
         largest if largest.significant else None,
         moments,
         command_times(problem, fit),
-        shared_cause(problem, windows) if moments else None,
+        shared,
     )
+
+
+def with_moments_of(rest: Unexplained, problem: Problem, fit: Fit) -> Unexplained:
+    """The same, with the moments that stand out under another model of the same tracks."""
+    moments, shared = _moments(problem, fit)
+    return replace(rest, outliers=moments, shared=shared)
+
+
+def _moments(problem: Problem, fit: Fit) -> tuple[tuple[Outlier, ...], SharedCause | None]:
+    windows = judged_windows(problem, fit)
+    moments = tuple(outliers(problem, fit, windows))
+    return moments, shared_cause(problem, windows) if moments else None

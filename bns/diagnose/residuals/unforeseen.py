@@ -24,7 +24,7 @@ def unforeseen(problem: Problem, fit: Fit) -> Array:
 
 
 def unforeseen_way(problem: Problem, fit: Fit, begin: NDArray[np.int64], end: NDArray[np.int64]) -> Array:
-    """From frames ``begin`` to ``end`` (windows,), all equally long, beyond the model's way: (windows, 3) as `unforeseen`.
+    """From frames ``begin`` to ``end`` (windows,), beyond the model's way: (windows, 3) as `unforeseen`.
 
     In the robot's frame where a window begins. Only the poses at both ends are used.
     """
@@ -36,7 +36,8 @@ def ways(problem: Problem, fit: Fit, begin: NDArray[np.int64], end: NDArray[np.i
     tracks, steps = problem.predictor.tracks, problem.predictor.steps(fit.model)
     driven = np.zeros((len(begin), 3))
     for k in range(1, int((end - begin).max(initial=0)) + 1):
-        forward, left, turn = steps.body[begin + k].T
+        within = np.where(begin + k <= end, 1.0, 0.0)[:, None]
+        forward, left, turn = (steps.body[np.minimum(begin + k, end)] * within).T
         c, s = np.cos(driven[:, 2]), np.sin(driven[:, 2])
         driven += np.stack([c * forward - s * left, s * forward + c * left, turn], axis=1)
     drift = np.cumsum(steps.drift_m, axis=0)

@@ -15,6 +15,7 @@ import numpy as np
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.problem import problem_with_noise
+from bns.diagnose.estimate.pseudo_inverse import pseudo_inverse
 from bns.diagnose.estimate.significance import chance
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect
@@ -135,7 +136,7 @@ def _scored_at(few: Problem, base: Fit, effect: Effect, values: tuple[float, ...
 
 def _gain(gradient: Array, curvature: Array) -> float:
     """By how much a step of least squares lowers the loss."""
-    return float(gradient @ np.linalg.pinv(curvature, hermitian=True) @ gradient) / 2
+    return float(gradient @ pseudo_inverse(curvature) @ gradient) / 2
 
 
 def _column(few: Problem, base: Fit, effect: Effect, index: int, value: float) -> Array:

@@ -23,6 +23,18 @@ class Estimate:
         "A step that lowers the loss by less ends the fit: parameters are then within a tenth of their standard "
         "error.",
     )
+    together_chance: float = setting(
+        0.05,
+        "1",
+        "An effect, each of whose numbers may be the neutral one, acts all the same if chance alone sets all of them as far off "
+        "together more rarely than this: the complement of the 95 % of the intervals.",
+    )
+    singular: float = setting(
+        1e-12,
+        "1",
+        "A direction in which the curvature, in units in which that of each number is 1, is a smaller share of the largest is "
+        "taken for rounding: slopes by differences are right to about a millionth, which squared is this.",
+    )
     fit_trusted: float = setting(
         0.75,
         "1",

@@ -46,11 +46,12 @@ EFFECT = Effect(
     residuals="After a change of the command the speed goes beyond the new one and comes back; what was lost at first is partly "
     "made up for.",
     lookalikes=("motor-lag", "clock-offset", "command-delay"),
-    sentence="the wheels' speed controllers overshoot",
+    sentence="the wheels answer a command in two stages, as a drive of the second order does, and may swing before they settle",
     measurement="log the wheels' own speeds (encoders) at a high rate while a command changes, ahead and on the spot",
     explained_by=("wheel_left_m_s", "wheel_right_m_s"),
-    caveat="controller-overshoot: a marker on a mast that swings answers in the same way. Hold the mast, or log the wheels' own "
-    "speeds (columns wheel_left_m_s and wheel_right_m_s), to find out which of them swings.",
+    caveat="controller-overshoot: a marker on a mast that swings answers in the same way, and without a swing firmware that "
+    "averages its commands does. Hold the mast, or log the wheels' own speeds (columns wheel_left_m_s and wheel_right_m_s), to "
+    "find out which of them it is.",
     apply=apply,
     starts=tuple((0.0, lead, swing, 1.0) for swing in (0.04, 0.1, 0.25) for lead in (swing, 2.0 * swing)),
     needs="track",

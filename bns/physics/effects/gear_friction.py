@@ -50,6 +50,8 @@ EFFECT = Effect(
     "the most abruptly.",
     lookalikes=("motor-lag", "inertia-lag", "dead-zone", "acceleration-limit"),
     sentence="friction in the gears ends a motion sooner than the motors alone would",
+    sized="the motors follow their commands with a lag of {tau_s} on straight lines, and friction in the gears, which takes "
+    "{friction_m_s} from a wheel that coasts, ends a motion sooner",
     measurement="log the wheels' own speeds (encoders) fast, from a command to stop until they stand; at several speeds",
     apply=apply,
     needs="track",
