@@ -20,7 +20,7 @@ from bns.diagnose.residuals.along_variables import ResidualDependence, residual_
 from bns.diagnose.residuals.established import Established, established, left_over
 from bns.diagnose.residuals.floor_field import imitating_floor
 from bns.diagnose.residuals.symbolic import Formula, best_formula
-from bns.diagnose.residuals.unexplained import NOTHING, Unexplained, unexplained, with_moments_of
+from bns.diagnose.residuals.unexplained import NOTHING, Unexplained, unexplained, without_moments_explained
 from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.negligible import LEAST_FALL, fall_matters, negligible
 from bns.diagnose.select.result import SelectionResult, certainly_lower
@@ -126,7 +126,7 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
         elif matters or next_to.rest.any:
             stands, imitating, terms, with_terms = next_to, lost, found.terms, errors
             if errors is not None and not errors.rose_in_the_end:  # what a term describes is no accident
-                stands = replace(stands, rest=with_moments_of(stands.rest, found.problem, found.fit))
+                stands = replace(stands, rest=without_moments_explained(stands.rest, found.problem, found.fit))
     if unseen or slight:
         stands = replace(stands, rest=NOTHING)
     whole = stands.selection

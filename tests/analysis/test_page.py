@@ -45,8 +45,9 @@ def browse(place: Path, width: int, profile: Path) -> str:
     return subprocess.run(command, capture_output=True, text=True, timeout=600, check=True).stdout
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine; apt-get install chromium")
-@pytest.mark.parametrize("width", [pytest.param(1280, marks=pytest.mark.slow), 400])
+@pytest.mark.parametrize("width", [1280, 400])
 def test_a_browser_shows_every_picture_from_the_file_system_and_scrolls_down_only(drawn, tmp_path, width):
     probed = drawn / f"probed-{width}.html"
     probed.write_text((drawn / "index.html").read_text().replace("</head>", PROBE))

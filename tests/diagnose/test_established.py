@@ -149,33 +149,30 @@ def test_honest_robots_leave_nothing(seed):
     assert significant(ranked(problem, fit, [*tried, rounding(problem, fit)])) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("on", "term", "value", "signal", "says"),
     [
         ("left", "-k * sign(u)", 0.012, "speed of the left wheel", r"the left .* 0\.0199 m/s gives 0\.008\d* m/s \(-5\d\..*"),
         pytest.param(
             "wheels", "-k * min(u, 0)", 0.1, "speed of each wheel", r"a wheel's .* -0\.199 m/s gives -0\.179 m/s \(-10\.\d%\)",
-            marks=pytest.mark.slow,
         ),
         pytest.param(
             "left", "-k * u * max(u, 0)", 1.5, "speed of the left wheel, forwards and backwards",
             r"the left .* 0\.199 m/s gives 0\.1[34]\d* m/s \(-\d\d\.\d%\), -0\.199 m/s gives -0\.(199|2)\d* m/s \(.*%\)",
-            marks=pytest.mark.slow,
         ),
         pytest.param(
             "w", "-k * abs(v) * sin(heading - 1)", 0.5, "heading, in proportion to the speed",
             r"turning velocity at 0\.\d+ m/s depends on heading: \+\S+ °/s at a heading of -3\d°, -\S+ °/s at a heading of 14\d°",
-            marks=pytest.mark.slow,
         ),
         pytest.param(
             "right", "-k * max(fresh, 0)", 0.5, "changes of speed of the right wheel",
-            r"just after a change of the right wheel's speed, \d\d% of it is missing, .*", marks=pytest.mark.slow,
+            r"just after a change of the right wheel's speed, \d\d% of it is missing, .*",
         ),
         ("v", "-k * abs(v) * cos(heading)", 0.06, "direction of travel",
          r"slower by [56]\.\d+% when it travels towards -?[0-5]°, faster by [56]\.\d+% .* -?1[78]\d°"),
         pytest.param(
             "w", "-k * moving * exp(-((x - 0.1)**2 + y**2) / 0.08)", 0.3, "place", "turning velocity depends on place .*",
-            marks=pytest.mark.slow,
         ),
     ],
 )  # fmt: skip
@@ -425,7 +422,7 @@ def test_a_formula_that_is_no_part_of_the_model_is_called_a_hint():
     assert "bns add LOG drag --term 'k * v' --on v --model MODEL -o NEW.yaml" in text
 
 
-@pytest.mark.parametrize(("waves", "shown"), [(1, True), (9, False)])
+@pytest.mark.parametrize(("waves", "shown"), [(1, True), pytest.param(9, False, marks=pytest.mark.slow)])
 def test_a_long_formula_is_said_where_it_is_and_not_shown(waves, shown):
     predictor = predictor_of(NOMINAL)
     found, problem = diagnose(predictor, NOMINAL), problem_for(predictor, NOMINAL)

@@ -162,21 +162,24 @@ def test_what_terms_describe_wholly_counts_only_if_it_matters(monkeypatch, matte
         assert next(said).startswith("What is left is certain but slight: slower for two seconds.")
 
 
-@pytest.mark.parametrize("rises", [(), ("trial",)])
-def test_moments_that_a_term_describes_are_none_unless_it_is_rejected(monkeypatch, rises):
-    """With mocked parts: moments stand out beside the effect, and none does beside the term."""
+@pytest.mark.parametrize(("rises", "stay"), [((), "b"), (("trial",), "ab")])
+def test_moments_that_a_term_describes_are_none_unless_it_is_rejected(monkeypatch, rises, stay):
+    """With mocked parts: two trials have moments beside the effect; beside the term one of them has, and one that had none."""
     searched = selected("wheelbase")
     found = Established(("wheelbase",), ("a term",), searched.problem, "fit with the term")
-    left = replace(NOTHING, outliers=("a moment",), shared="what it shares")
+    moments = {name: SimpleNamespace(trial=name) for name in "abc"}
+    left = replace(NOTHING, outliers=(moments["a"], moments["b"]), shared="what they share")
     monkeypatch.setattr(outcome, "_established", lambda *_: found)
     monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: SimpleNamespace(rose_in_the_end=rises))
     monkeypatch.setattr(outcome, "_believable", lambda found, *_: found)
     monkeypatch.setattr(outcome, "_matters", lambda _: True)
     monkeypatch.setattr(outcome, "unexplained", lambda *_: left)
     monkeypatch.setattr(rest_module, "judged_windows", lambda _, fit: fit)
-    monkeypatch.setattr(rest_module, "outliers", lambda _, fit, windows: [] if fit == windows == found.fit else ["a moment"])
+    monkeypatch.setattr(rest_module, "shared_cause", lambda *_: "what is left of it")
+    monkeypatch.setattr(rest_module, "outliers", lambda _, fit, windows: [moments["b"], moments["c"]] if fit == windows else [])
     ended = outcome.outcome_of(searched, predictor(), NOMINAL, lambda _: None)
-    assert (ended.rest.outliers, ended.rest.shared) == ((("a moment",), "what it shares") if rises else ((), None))
+    assert [one.trial for one in ended.rest.outliers] == list(stay)
+    assert ended.rest.shared == ("what they share" if rises else "what is left of it")
 
 
 @pytest.mark.parametrize("better", [True, False])

@@ -104,7 +104,7 @@ def test_every_verdict_has_a_page_that_needs_nothing_else(page_of, verdict):
 @pytest.mark.parametrize(
     ("verdict", "said"),
     [
-        ("none", "Nothing is missing"),
+        pytest.param("none", "Nothing is missing", marks=pytest.mark.slow),
         pytest.param("effects", "turning costs forward speed", marks=pytest.mark.slow),
         pytest.param("tie", "every wheel loses a constant part of its speed to friction; or ", marks=pytest.mark.slow),
         pytest.param("unlisted", "none of the known effects", marks=pytest.mark.slow),
@@ -170,6 +170,7 @@ def test_what_cannot_be_asked_is_refused_and_nothing_written(tmp_path, monkeypat
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_letters_that_mean_something_to_a_browser_do_no_harm(tmp_path):
     data, out = tmp_path / "a<b>&.csv", tmp_path / "page.html"
     table = measured(NOMINAL, trials=3, ends_only=True)

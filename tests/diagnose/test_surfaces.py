@@ -28,5 +28,6 @@ def test_a_surface_has_no_number_of_its_own_where_the_robot_hardly_drove():
 
     assert numbers(fastest, sharpest) == numbers(0.0, sharpest)
     assert numbers(fastest, 0.6 * sharpest) == numbers(fastest, 0.0) != numbers(0.0, sharpest)
-    everywhere = families(WheelPredictor(tracks_of(measured(NOMINAL, trials=20, seed=3, speeds=(-0.2, 0.2)))), NOMINAL.wheelbase_m)
+    both_ways = WheelPredictor(tracks_of(measured(NOMINAL, trials=20, seed=3, speeds=(-0.2, 0.2))))
+    everywhere = families(both_ways, NOMINAL.wheelbase_m)
     assert len(next(f for f in everywhere if (f.signal, f.on) == (SURFACE, "share")).functions) > 8

@@ -51,10 +51,14 @@ def unexplained(problem: Problem, fit: Fit, seen: Sequence[ResidualDependence]) 
     )
 
 
-def with_moments_of(rest: Unexplained, problem: Problem, fit: Fit) -> Unexplained:
-    """The same, with the moments that stand out under another model of the same tracks."""
+def without_moments_explained(rest: Unexplained, problem: Problem, fit: Fit) -> Unexplained:
+    """The same, with those moments that stand out beside a larger model of the same tracks as well; others are not looked for."""
+    if not rest.outliers:
+        return rest
+    trials = {moment.trial for moment in rest.outliers}
     moments, shared = _moments(problem, fit)
-    return replace(rest, outliers=moments, shared=shared)
+    left = tuple(moment for moment in moments if moment.trial in trials)
+    return replace(rest, outliers=left, shared=shared if left else None)
 
 
 def _moments(problem: Problem, fit: Fit) -> tuple[tuple[Outlier, ...], SharedCause | None]:
