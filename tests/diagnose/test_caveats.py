@@ -10,11 +10,14 @@ import pytest
 import bns.api.diagnose as asked_of
 import bns.diagnose.diagnosis as said_by
 from bns.api.diagnose import DiagnoseResult
+from bns.cli.commands.diagnose import _which
 from bns.diagnose.caveats import (
     _on_drift,
     _on_effects,
+    _on_reach,
     _on_rejected,
     _on_rest,
+    _on_terms,
     _on_times,
     implausible_text,
     notes_on,
@@ -301,3 +304,19 @@ def test_of_a_few_clocks_only_a_correlation_that_is_hardly_luck_is_a_drift(r, sa
     notes = list(_on_drift("clock-offset", start_s, 0.01 * (r * along + np.sqrt(1 - r * r) * beside)))
     assert bool(notes) == said
     assert not said or f"(correlation {r:+.2f})" in notes[0]
+
+
+def test_terms_are_said_to_hold_for_what_was_driven():
+    tracks = SimpleNamespace(left_m_s=np.array([[-0.1, 0.25]]), right_m_s=np.array([[0.0, -0.31]]))
+    assert "has driven (wheels from -0.31 to 0.25 m/s, and turns as quick as these)" in _on_reach(tracks)
+    fit = SimpleNamespace(model=None)
+    found = SimpleNamespace(selection=SimpleNamespace(fit=fit, accepted=()), errors_with_terms=None, terms=(), slight=())
+    assert list(_on_terms(found, [], tracks)) == []
+
+
+@pytest.mark.parametrize(("others", "said"), [((("command-delay",),), True), ((), False)])
+def test_of_a_tie_the_command_line_says_which_explanation_it_wrote(others, said):
+    selection = SimpleNamespace(competing_models=others)
+    text = _which(SimpleNamespace(diagnosis=SimpleNamespace(selection=selection), effects=("clock-offset", "wheelbase")))
+    assert ("it has the first: clock-offset, wheelbase." in text) is said
+    assert said or text == ""

@@ -41,6 +41,8 @@ def number(value, low=None, high=None, **more):
         ("clock-offset", {"offset_s": number(-1.25)}, "the tracker's clock is 1.25 s behind the clock of the commands"),
         ("clock-drift", {"rate": number(0.003)}, "the tracker's clock runs 0.3 % faster than the clock of the commands"),
         ("understeer", {"loss_s_m": number(-0.2)}, "the robot turns more the faster it drives"),
+        ("mass-offset", {"lead_m_s": number(-0.002)},
+         "the robot's mass lies behind its axle: it turns more when it drives forward, and less backward"),
         ("battery-sag", {"rate_per_s": number(-0.001)}, "the robot becomes faster in the course of the session"),
         ("battery-sag", {"rate_per_s": number(0.0), "per_volt": number(0.2)}, "the robot becomes slower (or faster) in"),
         ("dead-zone", {"width_m_s": number(0.0060564)}, "every wheel loses 6.1 mm/s of its speed to friction"),

@@ -51,8 +51,8 @@ EFFECT = Effect(
     "on the spot fit, but drift to the heavy side.",
     lookalikes=("understeer", "marker-offset", "inertia-lag"),
     sentence="the robot's mass lies ahead of or behind its axle, and turns it less one way than the other",
-    sized="the robot's mass lies {lead_m_s:ahead of|behind} its axle: it turns {lead_m_s:less|more} when it drives forward, and "
-    "{lead_m_s:more|less} backward",
+    sized="the robot's mass lies {lead_m_s:ahead of|behind|} its axle: it turns {lead_m_s:less|more|} when it drives forward, "
+    "and {lead_m_s:more|less|} backward",
     measurement="drive one circle forward and the same one backward, and measure both diameters; or find the centre of mass: "
     "balance the robot on an edge below it",
     apply=apply,
