@@ -23,6 +23,7 @@ from bns.diagnose.predict.paired_errors import PairedErrors, noise_json, plain
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.along_variables import ResidualDependence
 from bns.diagnose.residuals.established import curve_does_better
+from bns.diagnose.residuals.outliers import one_wheel
 from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.residuals.unexplained import NOTHING, Unexplained
 from bns.diagnose.residuals.words import in_words
@@ -148,7 +149,7 @@ class Diagnosis:
         often = "the error is large at some moments, too often for accidents"
         what = often if len(moments) >= OFTEN * trials else "the error is large for a moment"
         worst = f"in {len(moments)} of {trials} trials {what}; the worst is {moments[0].in_words}"
-        return *scattered, worst, *((shared.in_words,) if shared is not None else ())
+        return tuple(filter(None, (*scattered, worst, one_wheel(moments), shared.in_words if shared is not None else "")))
 
     @property
     def numbers(self) -> dict[str, dict[str, dict[str, Any]]]:

@@ -1,11 +1,15 @@
-"""Free surfaces over speed and turn, where a log says little of a part of them."""
+"""Free surfaces over speed and turn, where a log says little of a part of them; and formulas without a signal, in words."""
 
 import numpy as np
 import pandas as pd
+import pytest
 
 from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.grammar import SURFACE, families
+from bns.diagnose.residuals.symbolic import fitted
+from bns.diagnose.residuals.words import in_words
 from bns.physics.formula import value_of
 from tests.diagnose.worlds import NOMINAL, measured
 
@@ -31,3 +35,13 @@ def test_a_surface_has_no_number_of_its_own_where_the_robot_hardly_drove():
     both_ways = WheelPredictor(tracks_of(measured(NOMINAL, trials=20, seed=3, speeds=(-0.2, 0.2))))
     everywhere = families(both_ways, NOMINAL.wheelbase_m)
     assert len(next(f for f in everywhere if (f.signal, f.on) == (SURFACE, "share")).functions) > 8
+
+
+@pytest.mark.parametrize(
+    ("term", "said"),
+    [("k * v", "forward velocity differs from its command (by up to "), ("k * v * abs(w)", "forward velocity depends on ")],
+)
+def test_a_velocity_does_not_depend_on_itself(term, said):
+    predictor = WheelPredictor(tracks_of(measured(NOMINAL, trials=4, seed=3)))
+    problem = problem_for(predictor, NOMINAL)
+    assert in_words(fitted(problem, problem.fit(NOMINAL), "v", term), predictor).startswith(said)

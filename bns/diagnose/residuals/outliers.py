@@ -11,8 +11,10 @@ from one end of the window to the other is many times as far from the prediction
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +32,8 @@ TRIALS = DEFAULTS.residuals.outlier_trials
 JUMP = DEFAULTS.residuals.fault_jump
 WAYS = DEFAULTS.residuals.fault_ways
 TURN = DEFAULTS.residuals.fault_turn
+ALONE = DEFAULTS.residuals.outlier_alone
+CHANCE = DEFAULTS.residuals.chance
 _CLIP = DEFAULTS.residuals.clip
 
 
@@ -53,11 +57,20 @@ class Outlier:
     predicted_rad: float
     strayed_m: float = 0.0
     """How far it came from where it was predicted, at any frame of the window."""
+    left_m: float = 0.0
+    right_m: float = 0.0
+    """How much farther each wheel came than predicted, in the direction in which it was predicted to turn; less is negative."""
 
     @property
     def in_words(self) -> str:
         """All of it in a clause."""
         return f"trial {self.trial} {self.when}"
+
+    @property
+    def wheel(self) -> str:
+        """The wheel that alone did not turn as predicted; "" where both did not."""
+        less, more = sorted((abs(self.left_m), abs(self.right_m)))
+        return "" if less >= ALONE * more else "left" if abs(self.left_m) == more else "right"
 
     @property
     def when(self) -> str:
@@ -115,6 +128,8 @@ def moment_at(problem: Problem, fit: Fit, start: int, size: float) -> Outlier:
     ends = np.arange(begin + 1, end + 1)
     every, strayed = ways(problem, fit, np.full(len(ends), begin), ends)
     driven, off = every[-1], strayed[-1]
+    half_m = getattr(fit.model, "wheelbase_m", 0.0) / 2  # of a body on joints: no wheels
+    wheels = (float(np.sign(driven[0] + side * driven[2]) * (off[0] + side * off[2])) for side in (-half_m, half_m))
     way, turned = np.hypot(*(driven + off)[:2]), driven[2] + off[2]
     x, y, _ = tracks.pose[begin]
     return Outlier(
@@ -123,7 +138,20 @@ def moment_at(problem: Problem, fit: Fit, start: int, size: float) -> Outlier:
         size,
         float(tracks.own_s[end] - tracks.own_s[begin]),
         *(float(v) for v in (x, y, way, turned, np.hypot(*driven[:2]), driven[2], np.hypot(*strayed.T[:2]).max())),
+        *wheels,
     )
+
+
+def one_wheel(moments: Sequence[Outlier]) -> str:
+    """The wheel that alone did not turn as predicted in most of them, in a clause; "" where chance would do the same."""
+    sides = [moment.wheel for moment in moments if moment.wheel]
+    side = max(("left", "right"), key=sides.count)
+    same = [moment for moment in moments if moment.wheel == side]
+    ways = sum(comb(len(sides), k) for k in range(len(same), len(sides) + 1))
+    if not same or 2 * ways >= CHANCE * 2 ** len(sides):
+        return ""
+    short = sum(moment.left_m if side == "left" else moment.right_m for moment in same) < 0.0
+    return f"in {len(same)} of these moments the {side} wheel alone turned {'less' if short else 'more'} than predicted"
 
 
 def _windows(first: NDArray[np.int64]) -> NDArray[np.int64]:

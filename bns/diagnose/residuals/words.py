@@ -53,11 +53,10 @@ def in_words(term: Formula, predictor: Predictor) -> str:
         motion = {"v": " in forward motion", "w": " in its turns"}.get(term.on, "")
         return f"{_slower(-v['k'])}{motion} {there}"
     said = _SAID.get((term.signal, term.on))
-    return (
-        said(term, predictor)
-        if said
-        else f"{_VELOCITIES[term.on]} depends on {term.signal or _variables(term)} ({_largest(term, predictor)})"
-    )
+    if said:
+        return said(term, predictor)
+    what, of = _VELOCITIES[term.on], term.signal or _variables(term)
+    return f"{what} {'differs from its command' if of == what else f'depends on {of}'} ({_largest(term, predictor)})"
 
 
 _VELOCITIES = {

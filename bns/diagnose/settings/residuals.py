@@ -275,6 +275,12 @@ class Residuals:
         "20 to 60 Hz) and "
         "a right model, the largest value was 3.9.",
     )
+    outlier_alone: float = setting(
+        1 / 3,
+        "1",
+        "In a moment that stands out one wheel alone is said not to turn as predicted if the other one is off by less than this "
+        f"share of what it is off by; {BY_HAND}.",
+    )
     outlier_trials: int = setting(
         3,
         "trials",
