@@ -179,7 +179,7 @@ def test_what_an_effect_takes_for_granted_is_said_also_where_it_seems_to_imitate
     assert sum("the gears are assumed to touch in the forward direction" in note for note in notes) == 1
 
 
-@pytest.mark.parametrize(("accepted", "said"), [(("motor-lag",), 1), (("speed-gain",), 0)])
+@pytest.mark.parametrize(("accepted", "said"), [(("motor-lag",), 1), (("clock-offset",), 1), (("speed-gain",), 0)])
 def test_a_lag_is_said_to_be_perhaps_the_trackers(monkeypatch, accepted, said):
     found = SmoothingTracker(tau_s=0.1, z=5.0)
     monkeypatch.setattr("bns.diagnose.caveats.smoothing_tracker", lambda problem, fit: found)
@@ -320,3 +320,14 @@ def test_of_a_tie_the_command_line_says_which_explanation_it_wrote(others, said)
     text = _which(SimpleNamespace(diagnosis=SimpleNamespace(selection=selection), effects=("clock-offset", "wheelbase")))
     assert ("it has the first: clock-offset, wheelbase." in text) is said
     assert said or text == ""
+
+
+@pytest.mark.parametrize("together", [True, False])
+def test_numbers_that_are_only_known_together_are_said_to_be(monkeypatch, together):
+    monkeypatch.setattr("bns.diagnose.caveats.known_together", lambda fit, name: together and name == "backlash")
+    model = SimpleNamespace(per_trial_effect=None, effects=(), catalogue=all_effects)
+    fit = SimpleNamespace(model=model, free=())
+    selection = SimpleNamespace(accepted=("backlash", "speed-gain"), competing_models=(), steps=(), fit=fit)
+    tracks = SimpleNamespace(extra={}, start_known=False, commands_at_poses_s=None)
+    said = [note for note in _on_effects(selection, tracks) if "only known together" in note]
+    assert [note.split(":")[0] for note in said] == (["backlash"] if together else [])

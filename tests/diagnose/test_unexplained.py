@@ -272,6 +272,7 @@ def test_what_is_left_follows_a_variable_in_words():
     assert along.in_words == said
     only = Diagnosis("unlisted", None, rest=replace(NOTHING, residual_dependence=(along, along)))
     assert only.behaviour == (said,)
+    assert replace(only, terms_in_words=("slower",)).behaviour == ("slower",)  # a term that stands says it better
 
 
 def test_a_moment_that_begins_and_ends_where_it_is_predicted_says_how_far_the_track_strayed():

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from bns.physics.effects.mass_offset import apply
 from bns.physics.model import Model
+from bns.physics.signals import Body
 from bns.physics.wheels.differential_drive import simulate
 
 MASS, INERTIA, BASE, FORCE = 4.0, 0.04, 0.26, 25.0
@@ -42,3 +44,14 @@ def test_a_robot_that_would_spin_turns_three_times_as_fast_at_most():
     model = Model(wheelbase_m=BASE).with_effect("mass-offset", lead_m_s=-0.05)
     poses = simulate(model, np.array([[0.4]]), np.array([[0.5]]), np.array([[1.0]]), start=(0.0, 0.0, 0.0))
     assert poses[0, -1, 2] == pytest.approx(3 * 0.1 / BASE)
+
+
+@pytest.mark.parametrize("lead_m_s", [0.01, -0.006])
+def test_speed_and_turn_rate_have_settled(lead_m_s):
+    """Also where a sixth of the turn rate is lost."""
+    v, w, none = np.array([[0.3]]), np.array([[1.5]]), np.zeros((1, 1))
+    found = apply(Body(v, none, w, none + 1, none, none, none, wheelbase_m=BASE), lead_m_s)
+    np.testing.assert_allclose(found.forward_m_s, v + lead_m_s * found.yaw_rad_s**2, rtol=1e-9)
+    kept = 1 + 4 * lead_m_s * found.forward_m_s / BASE**2
+    np.testing.assert_allclose(found.yaw_rad_s, w / kept, rtol=1e-5)
+    assert abs(kept - 1) > 0.05
