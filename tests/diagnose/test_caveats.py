@@ -163,7 +163,7 @@ def test_an_offset_of_the_marker_may_be_the_robots():
     selection = SimpleNamespace(
         accepted=("camera-scale", "marker-offset"), competing_models=(), steps=(), fit=SimpleNamespace(model=model, free=())
     )
-    tracks = SimpleNamespace(extra={}, start_known=False, commands_at_poses_s=None)
+    tracks = SimpleNamespace(extra={}, start_known=False, commands_at_poses_s=None, timed=False)
     camera, marker = list(_on_effects(selection, tracks))[:2]
     assert camera == "camera-scale is an error of the measurement, not of the robot."
     assert marker.startswith("marker-offset is an error of the measurement, or else one of the model of the robot: ")
@@ -174,7 +174,7 @@ def test_what_an_effect_takes_for_granted_is_said_also_where_it_seems_to_imitate
     model = SimpleNamespace(per_trial_effect=None, effects=(), catalogue=all_effects)
     accepted = () if imitating else ("backlash",)
     selection = SimpleNamespace(accepted=accepted, competing_models=(), steps=(), fit=SimpleNamespace(model=model, free=()))
-    tracks = SimpleNamespace(extra={}, start_known=False, commands_at_poses_s=None)
+    tracks = SimpleNamespace(extra={}, start_known=False, commands_at_poses_s=None, timed=False)
     notes = list(_on_effects(selection, tracks, imitating))
     assert sum("the gears are assumed to touch in the forward direction" in note for note in notes) == 1
 
@@ -186,7 +186,7 @@ def test_a_lag_is_said_to_be_perhaps_the_trackers(monkeypatch, accepted, said):
     model = SimpleNamespace(per_trial_effect=None, effects=(), catalogue=all_effects)
     fit = SimpleNamespace(model=model, free=())
     selection = SimpleNamespace(accepted=accepted, competing_models=(), steps=(), problem=None, fit=fit)
-    tracks = SimpleNamespace(extra={}, start_known=False, commands_at_poses_s=None)
+    tracks = SimpleNamespace(extra={}, start_known=False, commands_at_poses_s=None, timed=False)
     assert sum(note == found.in_words for note in _on_effects(selection, tracks)) == said
 
 
@@ -328,6 +328,6 @@ def test_numbers_that_are_only_known_together_are_said_to_be(monkeypatch, togeth
     model = SimpleNamespace(per_trial_effect=None, effects=(), catalogue=all_effects)
     fit = SimpleNamespace(model=model, free=())
     selection = SimpleNamespace(accepted=("backlash", "speed-gain"), competing_models=(), steps=(), fit=fit)
-    tracks = SimpleNamespace(extra={}, start_known=False, commands_at_poses_s=None)
+    tracks = SimpleNamespace(extra={}, start_known=False, commands_at_poses_s=None, timed=False)
     said = [note for note in _on_effects(selection, tracks) if "only known together" in note]
     assert [note.split(":")[0] for note in said] == (["backlash"] if together else [])
