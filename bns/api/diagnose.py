@@ -95,9 +95,9 @@ class DiagnoseResult(Shown):
     def extended(self) -> Model | None:
         """The model with all that was found, effects and terms, as `bns diagnose -o` writes it; None if nothing was found.
 
-        Without terms with which the error on held-out trials rises at any horizon.
+        Without terms with which the error on held-out trials does not fall, or rises at any horizon.
         """
-        with_terms = None if self.diagnosis.terms_raise_the_error else self.model_with_terms
+        with_terms = None if self.diagnosis.terms_rejected else self.model_with_terms
         return with_terms or (self.model if self.effects else None)
 
     @property

@@ -108,15 +108,13 @@ def notes_on(
 def _on_terms(found: Outcome, terms: Sequence[str], tracks: Tracks) -> Iterator[str]:
     """On what no effect explains, in words; or why it is not in the extended model."""
     selection, with_terms = found.selection, found.errors_with_terms
-    if with_terms is not None and with_terms.rose_in_the_end:
+    if with_terms is not None and not with_terms.falls_in_the_end:
         yield from [_on_rejected(terms, with_terms)] if terms else []
         return
     yield from (f"What no listed effect explains behaves like this: {words}." for words in terms)
     if found.terms:
         yield from map(_on_cancelling, cancelled(selection.fit, found.terms[0].fit, selection.accepted))
         yield _on_reach(tracks)
-    if terms and with_terms is not None and not with_terms.falls:
-        yield _NO_LOWER
 
 
 def _on_reach(tracks: Tracks) -> str:
@@ -206,23 +204,20 @@ def on_many_apart(trials: Sequence[str]) -> str:
     )
 
 
-_NO_LOWER = (
-    "Adding a term for that does not clearly improve predictions of held-out trials: it describes the robot, but is not needed "
-    "in the model."
-)
-
-
 def _on_rejected(terms: Sequence[str], with_terms: PairedErrors) -> str:
-    """On terms that fit, and with which the error on held-out trials rises."""
+    """On terms that fit, and with which the error on held-out trials rises, or does not fall."""
     risen = with_terms.rose_in_the_end
     fallen = [horizon for horizon in with_terms.fell_in_the_end if horizon not in risen]
     rose, fell = (" and ".join(IN_WORDS.get(h, h) for h in names) for names in (risen, fallen))
     though = f", though it falls over {fell}" if fell else ""
     what = "a free term fits best that says" if len(terms) == 1 else "free terms fit best that say"
+    them = "it" if len(terms) == 1 else "them"
+    begun = f"Of what no listed effect explains {what}: {'; '.join(terms)}. With {them} the error on "
+    if not risen:
+        return f"{begun}held-out trials does not fall at any horizon, so the extended model does without."
     return (
-        f"Of what no listed effect explains {what}: {'; '.join(terms)}. With {'it' if len(terms) == 1 else 'them'} the error on "
-        f"held-out trials (root mean square or median) rises over {rose}{though}. So something else happens, and the extended "
-        "model does without."
+        f"{begun}held-out trials (root mean square or median) rises over {rose}{though}. So something else happens, and the "
+        "extended model does without."
     )
 
 

@@ -96,9 +96,9 @@ class Diagnosis:
         return self.terms[0].fit.model if self.terms else None
 
     @property
-    def terms_raise_the_error(self) -> bool:
-        """Does the error on held-out trials certainly rise with the terms, at any horizon? They are not added then."""
-        return _raises_the_error(self.errors_with_terms)
+    def terms_rejected(self) -> bool:
+        """Does the error on held-out trials not fall with the terms, or certainly rise at a horizon? They are not added then."""
+        return _lowers_no_error(self.errors_with_terms)
 
     def as_json(self) -> dict[str, Any]:
         """One object of plain values, as `bns diagnose --json` prints it."""
@@ -134,7 +134,7 @@ class Diagnosis:
     @property
     def behaviour(self) -> tuple[str, ...]:
         """What no effect explains, in clauses: the variable it follows most where no term stands, `moments`, terms that stand."""
-        terms = () if self.terms_raise_the_error else self.terms_in_words
+        terms = () if self.terms_rejected else self.terms_in_words
         most = self.rest.residual_dependence[:1] if not terms else ()
         return *(p.in_words for p in most), *self.moments, *terms
 
@@ -313,13 +313,13 @@ def _formula_in_words(formula: Formula | None, predictor: Predictor) -> str:
     return in_words(formula, predictor) if formula is not None and known else ""
 
 
-def _raises_the_error(with_terms: PairedErrors | None) -> bool:
-    return with_terms is not None and bool(with_terms.rose_in_the_end)
+def _lowers_no_error(with_terms: PairedErrors | None) -> bool:
+    return with_terms is not None and not with_terms.falls_in_the_end
 
 
 def _presented(selection: SelectionResult, terms: Sequence[Formula], with_terms: PairedErrors | None) -> Fit:
     """The fit whose numbers are shown: with the terms, where there are some that may be added."""
-    return terms[0].fit if terms and not _raises_the_error(with_terms) else selection.fit
+    return terms[0].fit if terms and not _lowers_no_error(with_terms) else selection.fit
 
 
 def _longer(selection: SelectionResult, effects: Mapping[str, Effect]) -> list[tuple[str, ...]]:

@@ -125,7 +125,7 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
             slight = found.terms
         elif matters or next_to.rest.any:
             stands, imitating, terms, with_terms = next_to, lost, found.terms, errors
-            if errors is not None and not errors.rose_in_the_end:  # what a term describes is no accident
+            if errors is not None and errors.falls_in_the_end:  # what a term describes is no accident
                 stands = replace(stands, rest=without_moments_explained(stands.rest, found.problem, found.fit))
     if unseen or slight:
         stands = replace(stands, rest=NOTHING)

@@ -83,7 +83,7 @@ def test_it_is_among_the_notes_where_the_term_is_in_the_extended_model(rose, sai
     found = SimpleNamespace(
         **nothing, selection=selection, negligible={}, beside_negligible={}, imitating=("battery-sag",), rest=NOTHING,
         terms=(SimpleNamespace(fit=fit_of((*SAG, 3e-4, 2.5e-4, 3.5e-4))),),
-        errors_with_terms=SimpleNamespace(rose_in_the_end=rose, falls=True),
+        errors_with_terms=SimpleNamespace(rose_in_the_end=rose, falls_in_the_end=not rose),
     )  # fmt: skip
     notes = list(notes_on(found, tracks_of(measured(NOMINAL, trials=10)), None))
     assert any(note.startswith("battery-sag and the free term cancel in part") for note in notes) == said

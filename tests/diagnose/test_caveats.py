@@ -43,6 +43,7 @@ MODELS = (SimpleNamespace(rms_m=0.1), SimpleNamespace(rms_m=0.1))
         (("trial",), ("command", "1s"), "rises over the whole trial, though it falls over one command and 1 second"),
         (("5s", "trial"), (), "rises over 5 seconds and the whole trial. So something else happens, and the extended model"),
         (("1s",), ("1s",), "With it the error on held-out trials (root mean square or median) rises over 1 second. So"),
+        ((), (), "With it the error on held-out trials does not fall at any horizon, so the extended model does without."),
     ],
 )
 def test_a_term_with_which_an_error_rises_must_not_be_added(rose, fell, said):
@@ -54,6 +55,25 @@ def test_an_error_that_may_have_changed_by_luck_neither_fell_nor_rose():
     each = {h: SimpleNamespace(total=None, changes=(change,), models=MODELS) for h, change in changes.items()}
     errors = PairedErrors(each, None, 20)
     assert (errors.fell_in_the_end, errors.rose_in_the_end) == (("command",), ("trial",))
+
+
+@pytest.mark.parametrize(
+    ("changes", "falls"),
+    [
+        (((-0.01, -0.02, -0.005), (0.01, -0.02, 0.03)), True),  # the surest one falls
+        (((-0.01, -0.02, -0.005), (0.02, 0.01, 0.03)), False),  # one certainly rises
+        (((0.001, -0.0003, 0.0025), (-0.0002, -0.0006, 0.0002)), False),  # the surest one does not fall
+    ],
+)
+def test_terms_stand_where_the_error_falls_from_the_effects_to_them(changes, falls):
+    large = Change(-1.0, -1.1, -0.9)
+    each = {str(i): SimpleNamespace(changes=(large, Change(*one)), models=MODELS) for i, one in enumerate(changes)}
+    errors = PairedErrors(each, None, 20)
+    assert errors.falls_in_the_end is falls
+    selection = SimpleNamespace(problem=None)
+    found = Diagnosis("unlisted", selection, terms=("a term",), terms_in_words=("slower",), errors_with_terms=errors)
+    assert found.terms_rejected is not falls
+    assert found.behaviour == (("slower",) if falls else ())
 
 
 @pytest.mark.slow
@@ -90,14 +110,16 @@ def test_an_error_falls_where_that_is_surest_and_rises_nowhere_by_what_matters(c
     assert PairedErrors(horizons, None, 20).falls == falls
 
 
-@pytest.mark.parametrize(("low", "high", "added"), [(0.001, 0.02, False), (-0.001, 0.02, True)])
-def test_terms_with_which_an_error_rises_are_in_no_extended_model(monkeypatch, low, high, added):
+@pytest.mark.parametrize(
+    ("change", "low", "high", "added"), [(0.01, 0.001, 0.02, False), (0.01, -0.001, 0.02, False), (-0.01, -0.02, 0.001, True)]
+)
+def test_terms_with_which_no_error_falls_are_in_no_extended_model(monkeypatch, change, low, high, added):
     """The fits are mocked: with the term the gain is 0.8, without it 0.9."""
     fits = {name: SimpleNamespace(model=name, free=()) for name in ("without", "with")}
     monkeypatch.setattr(said_by, "numbers_of", lambda fit: {"speed-gain": 0.8 if fit is fits["with"] else 0.9})
     monkeypatch.setattr(asked_of, "documented", lambda fit, *_: fit.model)
     monkeypatch.setattr(asked_of, "Model", lambda model: model)
-    errors = PairedErrors({"trial": SimpleNamespace(total=None, changes=(Change(0.01, low, high),), models=MODELS)}, None, 20)
+    errors = PairedErrors({"trial": SimpleNamespace(total=None, changes=(Change(change, low, high),), models=MODELS)}, None, 20)
     found = Diagnosis(
         "unlisted", SimpleNamespace(fit=fits["without"], accepted=("speed-gain",)), errors_with_terms=errors,
         terms=(SimpleNamespace(fit=fits["with"], name="unlisted"),),

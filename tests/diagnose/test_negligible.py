@@ -38,7 +38,7 @@ from tests.diagnose.worlds import NOMINAL, hidden, measured
 
 TRUTH = {"wheelbase": {"factor": 1.05}, "wheel_mismatch": {"ratio": 1.004}, "clock_offset": {"offset_s": -5e-4}}
 
-RISING = SimpleNamespace(rose_in_the_end=("trial",))
+RISING = SimpleNamespace(falls_in_the_end=False)
 """Errors with terms that are said to rise; what stands is decided elsewhere."""
 
 
@@ -170,7 +170,7 @@ def test_moments_that_a_term_describes_are_none_unless_it_is_rejected(monkeypatc
     moments = {name: SimpleNamespace(trial=name) for name in "abc"}
     left = replace(NOTHING, outliers=(moments["a"], moments["b"]), shared="what they share")
     monkeypatch.setattr(outcome, "_established", lambda *_: found)
-    monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: SimpleNamespace(rose_in_the_end=rises))
+    monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: SimpleNamespace(falls_in_the_end=not rises))
     monkeypatch.setattr(outcome, "_believable", lambda found, *_: found)
     monkeypatch.setattr(outcome, "_matters", lambda _: True)
     monkeypatch.setattr(outcome, "unexplained", lambda *_: left)

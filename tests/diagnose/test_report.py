@@ -259,7 +259,7 @@ def test_the_table_of_errors_has_every_model_of_the_answer(effects, terms, colum
     at = SimpleNamespace(horizon="1s", windows=7, models=models, total=None, noise_floor_m=0.002)
     errors = SimpleNamespace(horizons={"1s": at})
     d = SimpleNamespace(effects=effects, errors=None if terms else errors, errors_with_terms=errors if terms else None)
-    d.terms_raise_the_error = False
+    d.terms_rejected = False
     table = error_table(d, None)
     assert table["columns"][1 : 1 + len(columns)] == columns
     said = [cell.partition(" ")[0] for cell in table["rows"][0][1 : 1 + len(columns)]]
@@ -275,12 +275,12 @@ def test_the_change_of_the_error_leads_to_the_last_model_that_is_accepted(effect
     changes, total = ((fell, rose), Change(-0.005, -0.007, -0.003)) if effects else ((rose,), rose)
     at = {"horizon": "1s", "windows": 7, "models": models, "changes": changes, "total": total, "noise_floor_m": 0.002}
     errors = SimpleNamespace(horizons={"1s": SimpleNamespace(**at)})
-    d = SimpleNamespace(effects=effects, errors=None, errors_with_terms=errors, terms_raise_the_error=True)
+    d = SimpleNamespace(effects=effects, errors=None, errors_with_terms=errors, terms_rejected=True)
     table = error_table(d, None)
     assert "with a term that was rejected (mm)" in table["columns"]
     shown = dict(zip(table["columns"], table["rows"][0], strict=True))
     assert shown.get("change, 95 % (mm)") == ("-12.00 to -8.00" if effects else None)
-    d.terms_raise_the_error = False
+    d.terms_rejected = False
     table = error_table(d, None)
     assert dict(zip(table["columns"], table["rows"][0], strict=True))["change, 95 % (mm)"] == (
         "-7.00 to -3.00" if effects else "+4.00 to +6.00"

@@ -136,6 +136,11 @@ class PairedErrors:
         return _falls([(e.total, e.models[0].rms_m) for e in self.horizons.values() if e.total is not None])
 
     @property
+    def falls_in_the_end(self) -> bool:
+        """Does the error fall from the last model but one to the last? As `between`."""
+        return _falls([(e.changes[-1], e.models[-2].rms_m) for e in self.horizons.values() if e.changes])
+
+    @property
     def fell_in_the_end(self) -> tuple[str, ...]:
         """Horizons at which the error certainly falls from the last model but one to the last."""
         return tuple(h for h, e in self.horizons.items() if e.changes and e.changes[-1].fell)

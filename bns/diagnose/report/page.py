@@ -142,7 +142,7 @@ def _values(m: Material, command: Mapping[str, str]) -> dict[str, Any]:
 
 def _terms(d: Diagnosis) -> list[dict[str, str]]:
     """What no effect explains, in words and as formulas that can be added; where there is none, a formula that was found."""
-    if d.terms_raise_the_error:
+    if d.terms_rejected:
         return []
     terms = d.terms or ((d.formula,) if d.formula else ())
     words = d.terms_in_words or (d.formula_in_words or "A formula was found that explains a part of it",) * len(terms)

@@ -39,7 +39,7 @@ def error_table(d: Diagnosis, c: Comparison | None) -> Table | None:
     models += ["with the effects (mm)"] if d.effects else []
     accepted = len(models)
     if d.errors_with_terms is not None:
-        rejected = d.terms_raise_the_error
+        rejected = d.terms_rejected
         models += ["with a term that was rejected (mm)" if rejected else "with what is left described, too (mm)"]
         accepted += not rejected
     changes = ["change, 95 % (mm)"] if accepted > 1 else []

@@ -147,14 +147,14 @@ def _behaviour(d: Diagnosis) -> Iterator[str]:
 
 def _terms(d: Diagnosis) -> Iterator[str]:
     """The terms as formulas; of a long one, where it is written."""
-    begun = "rejected" if d.terms_raise_the_error else "candidate"
+    begun = "rejected" if d.terms_rejected else "candidate"
     for term in d.terms:
         numbers = numbers_of_term(term)
         if len(term.term) <= _WIDTH:
             yield f"\n{begun} term {term.name}, added to {term.on}: {term.term}"
             yield from _intervals({term.name: numbers})
             continue
-        written = "" if d.terms_raise_the_error else " and in the model that -o FILE writes"
+        written = "" if d.terms_rejected else " and in the model that -o FILE writes"
         yield (
             f"\n{begun} term {term.name} ({term.signal}), added to {term.on}: {len(numbers)} numbers; the formula is in the "
             f"output of --json{written}"
