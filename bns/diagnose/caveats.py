@@ -214,7 +214,7 @@ def _on_rejected(terms: Sequence[str], with_terms: PairedErrors) -> str:
     them = "it" if len(terms) == 1 else "them"
     begun = f"Of what no listed effect explains {what}: {'; '.join(terms)}. With {them} the error on "
     if not risen:
-        return f"{begun}held-out trials does not fall at any horizon, so the extended model does without."
+        return f"{begun}held-out trials does not fall where its change is surest, so the extended model does without."
     return (
         f"{begun}held-out trials (root mean square or median) rises over {rose}{though}. So something else happens, and the "
         "extended model does without."

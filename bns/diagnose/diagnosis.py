@@ -98,7 +98,7 @@ class Diagnosis:
     @property
     def terms_rejected(self) -> bool:
         """Does the error on held-out trials not fall with the terms, or certainly rise at a horizon? They are not added then."""
-        return _lowers_no_error(self.errors_with_terms)
+        return _rejected(self.errors_with_terms)
 
     def as_json(self) -> dict[str, Any]:
         """One object of plain values, as `bns diagnose --json` prints it."""
@@ -313,13 +313,13 @@ def _formula_in_words(formula: Formula | None, predictor: Predictor) -> str:
     return in_words(formula, predictor) if formula is not None and known else ""
 
 
-def _lowers_no_error(with_terms: PairedErrors | None) -> bool:
+def _rejected(with_terms: PairedErrors | None) -> bool:
     return with_terms is not None and not with_terms.falls_in_the_end
 
 
 def _presented(selection: SelectionResult, terms: Sequence[Formula], with_terms: PairedErrors | None) -> Fit:
     """The fit whose numbers are shown: with the terms, where there are some that may be added."""
-    return terms[0].fit if terms and not _lowers_no_error(with_terms) else selection.fit
+    return terms[0].fit if terms and not _rejected(with_terms) else selection.fit
 
 
 def _longer(selection: SelectionResult, effects: Mapping[str, Effect]) -> list[tuple[str, ...]]:

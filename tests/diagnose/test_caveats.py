@@ -43,7 +43,7 @@ MODELS = (SimpleNamespace(rms_m=0.1), SimpleNamespace(rms_m=0.1))
         (("trial",), ("command", "1s"), "rises over the whole trial, though it falls over one command and 1 second"),
         (("5s", "trial"), (), "rises over 5 seconds and the whole trial. So something else happens, and the extended model"),
         (("1s",), ("1s",), "With it the error on held-out trials (root mean square or median) rises over 1 second. So"),
-        ((), (), "With it the error on held-out trials does not fall at any horizon, so the extended model does without."),
+        ((), (), "With it the error on held-out trials does not fall where its change is surest, so"),
     ],
 )
 def test_a_term_with_which_an_error_rises_must_not_be_added(rose, fell, said):
@@ -113,7 +113,7 @@ def test_an_error_falls_where_that_is_surest_and_rises_nowhere_by_what_matters(c
 @pytest.mark.parametrize(
     ("change", "low", "high", "added"), [(0.01, 0.001, 0.02, False), (0.01, -0.001, 0.02, False), (-0.01, -0.02, 0.001, True)]
 )
-def test_terms_with_which_no_error_falls_are_in_no_extended_model(monkeypatch, change, low, high, added):
+def test_terms_with_which_the_error_does_not_fall_are_in_no_extended_model(monkeypatch, change, low, high, added):
     """The fits are mocked: with the term the gain is 0.8, without it 0.9."""
     fits = {name: SimpleNamespace(model=name, free=()) for name in ("without", "with")}
     monkeypatch.setattr(said_by, "numbers_of", lambda fit: {"speed-gain": 0.8 if fit is fits["with"] else 0.9})

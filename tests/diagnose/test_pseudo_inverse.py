@@ -1,7 +1,5 @@
 """Numbers of very different sizes in one fit, and numbers that are only known together."""
 
-from dataclasses import replace
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -74,7 +72,7 @@ def test_such_an_effect_acts_and_its_numbers_are_not_to_be_read_alone(short_sess
     assert known_together(fit, COLD)
     assert not does_nothing(fit, COLD)
     errors = judged_errors(predictor, problem.pose_filter, NOMINAL, [])
-    said = list(warnings_on(replace(fit), [(effect_named(COLD), {})], errors))
+    said = list(warnings_on(fit, [(effect_named(COLD), {})], errors))
     assert not any("no visible effect" in line for line in said)
     assert _on_numbers(effect_named(COLD)).startswith(f"{COLD}: width_m_s and cold_m_s and time_s are only known together.")
 
