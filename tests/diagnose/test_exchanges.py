@@ -165,10 +165,25 @@ def test_no_explanation_competes_by_one_more_number_that_may_be_anything(monkeyp
     search._exchanges = SimpleNamespace(of=lambda *_: [("b", "c", tried)])
     monkeypatch.setattr(search, "_rejected", lambda *_, **__: "")
     monkeypatch.setattr(search, "_earned_over", lambda *_: True)
-    for name, answer in (("limiting", anything), ("indistinguishable", True), ("fit_without", None)):
+    for name, answer in (("limiting", anything), ("indistinguishable", True), ("fit_without", None), ("believable", None)):
         monkeypatch.setattr(stepwise, name, lambda *_, answer=answer: answer)
     found = search._competing_models(None, fit, ("a", "b", "d"))
     assert found == ([(("a", "c", "d"), tried)] if competes else [])
+
+
+@pytest.mark.parametrize(("alike", "competes"), [("as found", False), ("held", True)])
+def test_a_number_that_no_robot_has_competes_by_the_best_plausible_one(monkeypatch, alike, competes):
+    search = StepwiseSelection.__new__(StepwiseSelection)
+    fit, tried = SimpleNamespace(free=[1]), SimpleNamespace(free=[1], name="as found")
+    search._exchanges = SimpleNamespace(of=lambda *_: [("b", "c", tried)])
+    monkeypatch.setattr(search, "_rejected", lambda *_, **__: "")
+    monkeypatch.setattr(search, "_earned_over", lambda *_: True)
+    monkeypatch.setattr(stepwise, "fit_without", lambda *_: None)
+    monkeypatch.setattr(stepwise, "believable", lambda *_: "model")
+    monkeypatch.setattr(stepwise, "indistinguishable", lambda one, *_: one.name == alike)
+    problem = SimpleNamespace(fit=lambda model: SimpleNamespace(name={"model": "held"}[model]))
+    found = search._competing_models(problem, fit, ("a", "b"))
+    assert found == ([(("a", "c"), tried)] if competes else [])
 
 
 def test_the_best_of_the_decoys_sets_the_threshold(monkeypatch):

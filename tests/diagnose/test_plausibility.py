@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from bns.diagnose.estimate.fit import FreeParameter
-from bns.diagnose.estimate.plausibility import fitted_again, implausible, limiting, undetermined
+from bns.diagnose.estimate.plausibility import believable, fitted_again, implausible, limiting, undetermined
 from bns.physics.effect import Parameter
 from tests.diagnose.worlds import NOMINAL
 
@@ -39,6 +39,23 @@ def test_a_number_at_its_bound_is_implausible_where_bounds_count():
     assert implausible(fit, "e") == "gain is at its bound, 9"
     assert implausible(fit, "e", bounds=False) == ""
     assert implausible(fit, "another") == ""
+
+
+@pytest.mark.parametrize(
+    ("cool_s", "held_at"), [(4000.0, 3000.0), (2.0, 3.0), (2999.0, None), (3000.0, None), (3.0, None), (1e5, None)]
+)
+def test_a_number_outside_of_what_is_plausible_is_held_at_the_end_of_it_unless_it_is_at_its_bound(cool_s, held_at):
+    model = NOMINAL.with_effect("heating", loss_per_m=0.01, cool_s=cool_s)
+    numbers = model.effects[-1].effect.parameters
+    free = (FreeParameter("other", GAIN), *(FreeParameter("heating", p) for p in numbers))
+    fit = SimpleNamespace(free=free, values=[3.0, 0.01, cool_s], model=model)
+    held = believable(fit, "heating")
+    if held_at is None:
+        assert held is None
+        return
+    loss, cool = held.effects[-1].effect.parameters
+    assert held.values_of("heating") == {"loss_per_m": 0.01, "cool_s": held_at}
+    assert ((loss.low, loss.high), (cool.low, cool.high)) == ((0.0, 2.0), (3.0, 3000.0))
 
 
 @pytest.mark.parametrize(("low", "high", "said"), [(0.9, 1.1, True), (0.9, 1.3, False), (1.2, 1.3, False), (1.21, 1.3, True)])

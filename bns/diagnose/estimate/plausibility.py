@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import fdtrc
@@ -39,6 +40,21 @@ def implausible(fit: Fit, name: str, bounds: bool = True) -> str:
             least, most = p.plausible
             return f"{p.name} = {value:g}{with_unit(p.unit)} is outside of the plausible range, {least:g} to {most:g}"
     return ""
+
+
+def believable(fit: Fit, name: str) -> Model | None:
+    """The model, if a number of an effect is outside of what is plausible, with that number at the end of its range, bounded there.
+
+    An interval by the curvature is as wide upwards as downwards; it may hold plausible numbers with which the loss is far higher.
+    """
+    own = {f.parameter.name: (f.parameter, float(v)) for f, v in zip(fit.free, fit.values, strict=True) if f.effect == name}
+    outside = {key for key, (p, value) in own.items() if not (p.plausible[0] <= value <= p.plausible[1] or _stopped(p, value))}
+    if not outside:
+        return None
+    active = next(a for a in fit.model.effects if a.effect.name == name)
+    bounded = tuple(replace(p, low=p.plausible[0], high=p.plausible[1]) if p.name in outside else p for p in active.effect.parameters)
+    values = (float(np.clip(active.by_name[p.name], p.low, p.high)) for p in bounded)
+    return fit.model.with_active(replace(active.effect, parameters=bounded), tuple(values))
 
 
 def undetermined(fit: Fit, name: str) -> str:

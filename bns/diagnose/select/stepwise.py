@@ -19,7 +19,7 @@ from bns.diagnose.estimate.clocks.trial_clock_test import (
 )
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.lacking import fit_without
-from bns.diagnose.estimate.plausibility import at_bound, implausible, limiting, undetermined
+from bns.diagnose.estimate.plausibility import at_bound, believable, implausible, limiting, undetermined
 from bns.diagnose.estimate.problem import settled_problem
 from bns.diagnose.estimate.significance import MIN_Z
 from bns.diagnose.estimate.starts import fit_extended, fit_with, listed
@@ -440,7 +440,8 @@ class StepwiseSelection:
         """Explanations of the same size, one effect exchanged, that these tracks cannot tell from the accepted one.
 
         What comes in must have earned its place: where trials disagree, much that earns nothing certain is no worse for certain.
-        Nor may one with more numbers have one that may be anything: a warm-up of any length at all is a gain.
+        Nor may one with more numbers have one that may be anything: a warm-up of any length at all is a gain. Where a number is
+        outside of what is plausible, it is the best plausible one that competes: a motor that never cools is a battery that sags.
         """
         competing_models: list[tuple[tuple[str, ...], Fit]] = []
         lacking = cache(partial(fit_without, problem, fit))
@@ -451,7 +452,8 @@ class StepwiseSelection:
             may = not self._rejected(tried, other, bounds=False) and self._earned_over(
                 problem, lacking(name), tried, other
             )
-            if may and indistinguishable(tried, fit, lacking(name)):
+            model = believable(tried, other) if may else None
+            if may and indistinguishable(tried if model is None else problem.fit(model), fit, lacking(name)):
                 competing_models.append((tuple(other if a == name else a for a in accepted), tried))
         return competing_models
 
