@@ -43,7 +43,7 @@ def implausible(fit: Fit, name: str, bounds: bool = True) -> str:
 
 
 def believable(fit: Fit, name: str) -> Model | None:
-    """The model, if a number of an effect is outside of what is plausible, with that number at the end of its range, bounded there.
+    """If a number of an effect is outside of its plausible range: the model with it at the end of that range, and bounded there.
 
     An interval by the curvature is as wide upwards as downwards; it may hold plausible numbers with which the loss is far higher.
     """
@@ -52,7 +52,8 @@ def believable(fit: Fit, name: str) -> Model | None:
     if not outside:
         return None
     active = next(a for a in fit.model.effects if a.effect.name == name)
-    bounded = tuple(replace(p, low=p.plausible[0], high=p.plausible[1]) if p.name in outside else p for p in active.effect.parameters)
+    numbers = active.effect.parameters
+    bounded = tuple(replace(p, low=p.plausible[0], high=p.plausible[1]) if p.name in outside else p for p in numbers)
     values = (float(np.clip(active.by_name[p.name], p.low, p.high)) for p in bounded)
     return fit.model.with_active(replace(active.effect, parameters=bounded), tuple(values))
 
