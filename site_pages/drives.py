@@ -70,6 +70,8 @@ VALUES: dict[str, dict[str, float]] = {
     "breakaway": {"threshold_m_s": 0.1, "stop_ratio": 0.4},
     "carpet-drift": {"x_share": 0.1, "y_share": -0.05},
     "command-timeout": {"timeout_s": 2.2},
+    "overload-trip": {"step_m_s": 0.1, "off_s": 0.5},
+    "supply-trip": {"step_m_s": 0.1, "off_s": 0.5},
     "sliding-contact": {"friction_m_s": 0.02, "distance_share": 0.6, "left_share": 0.0},
     "supply-sag": {"loss_s_m": 1.0},
     "tether-load": {

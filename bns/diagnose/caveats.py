@@ -17,7 +17,7 @@ from bns.diagnose.estimate.smoothing_tracker import LATE, smoothing_tracker
 from bns.diagnose.outcome import Outcome
 from bns.diagnose.predict.horizons import IN_WORDS
 from bns.diagnose.predict.paired_errors import PairedErrors
-from bns.diagnose.residuals.grammar import SHIFTS
+from bns.diagnose.residuals.grammar import PAST, SHIFTS
 from bns.diagnose.residuals.outliers import FAR
 from bns.diagnose.residuals.unexplained import Unexplained
 from bns.diagnose.residuals.worst_trials import WithoutWorst
@@ -113,7 +113,8 @@ def _on_terms(found: Outcome, terms: Sequence[str], tracks: Tracks) -> Iterator[
         return
     yield from (f"What no listed effect explains behaves like this: {words}." for words in terms)
     if found.terms:
-        yield from map(_on_cancelling, cancelled(selection.fit, found.terms[0].fit, selection.accepted))
+        past = any(term.signal in PAST for term in found.terms)
+        yield from map(_on_cancelling, cancelled(selection.fit, found.terms[0].fit, selection.accepted, past))
         yield _on_reach(tracks)
 
 
@@ -128,8 +129,14 @@ def _on_reach(tracks: Tracks) -> str:
 
 
 def _on_cancelling(each: Cancelled) -> str:
-    """On an effect and a free term that cancel in part."""
+    """On an effect and a free term that cancel in part, or that do a part of the same work each."""
     p = each.parameter
+    if each.divided:
+        return (
+            f"{each.name} and the free term each describe a part of the same delay: with the term in the model, {p.name} is "
+            f"{each.beside:.3g}{with_unit(p.unit)}, and {each.without:.3g} without it. Only both together are determined: do not "
+            f"read {p.name} by itself."
+        )
     return (
         f"{each.name} and the free term cancel in part: with the term in the model, {p.name} is {each.beside:.3g}"
         f"{with_unit(p.unit)}, and {each.without:.3g} without it. What acts may be neither of the two, but something that only "

@@ -23,6 +23,7 @@ from bns.diagnose.predict.paired_errors import PairedErrors, noise_json, plain
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.along_variables import ResidualDependence
 from bns.diagnose.residuals.established import curve_does_better
+from bns.diagnose.residuals.grammar import PAST
 from bns.diagnose.residuals.outliers import one_wheel
 from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.residuals.unexplained import NOTHING, Unexplained
@@ -167,7 +168,8 @@ class Diagnosis:
         own = {term.name for term in self.terms}
         found = {name: values for name, values in numbers_of(fit).items() if name not in own}
         if fit is not self.selection.fit:
-            for one in cancelled(self.selection.fit, fit, self.selection.accepted):
+            past = any(term.signal in PAST for term in self.terms)
+            for one in cancelled(self.selection.fit, fit, self.selection.accepted, past):
                 found[one.name][one.parameter.name]["cancels"] = True
         return found
 

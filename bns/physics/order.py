@@ -9,6 +9,8 @@ OTHERS, DECOYS, FORMULAS = "others", "decoys", "formulas"
 
 ORDER = (
     "command-timeout",  # counts from changes of the command itself
+    "overload-trip",  # and so do these two
+    "supply-trip",
     "command-quantisation",
     "command-truncation",
     "command-rate",

@@ -10,6 +10,7 @@ from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.cancelling import Cancelled, cancelled
 from bns.diagnose.report.sized import sized_sentence
+from bns.diagnose.residuals.grammar import RESPONSE
 from bns.diagnose.residuals.unexplained import NOTHING
 from bns.physics.effects import effect_named
 from tests.diagnose.worlds import NOMINAL, measured
@@ -52,6 +53,31 @@ def test_a_number_that_a_term_multiplies_or_turns_round_cancels_a_part_of_it(wit
     assert not list(cancelled(fit_of(without), fit_of(beside), ()))
 
 
+LAG = ("motor-lag", "tau_s")
+
+
+@pytest.mark.parametrize(
+    ("beside", "past", "divided"),
+    [
+        ((0.024, 0.02, 0.028), True, True),
+        ((0.024, 0.02, 0.028), False, False),  # a curve of the speed contains no lag
+        ((0.045, 0.04, 0.05), True, True),  # 0.05 is less than half of 0.11
+        ((0.05, 0.045, 0.056), True, False),
+        ((0.0, -0.01, 0.01), True, True),
+    ],
+)
+def test_a_lag_of_which_a_free_response_takes_the_most_is_not_to_be_read_by_itself(beside, past, divided):
+    fits = fit_of((*LAG, 0.12, 0.11, 0.13)), fit_of((*LAG, *beside))
+    found = list(cancelled(*fits, ("motor-lag",), past))
+    assert found == ([Cancelled("motor-lag", number_of(*LAG), 0.12, beside[0], True)] if divided else [])
+    perhaps_none = fit_of((*LAG, 0.12, -0.1, 0.3))
+    assert not list(cancelled(perhaps_none, fits[1], ("motor-lag",), past))
+    for one in found:
+        said = _on_cancelling(one)
+        assert said.startswith("motor-lag and the free term each describe a part of the same delay: with the term")
+        assert said.endswith("and 0.12 without it. Only both together are determined: do not read tau_s by itself.")
+
+
 def test_a_lag_that_differs_in_turns_has_one_size():
     without, beside = (
         (("inertia-lag", "tau_s", tau, 0.9 * tau, 1.1 * tau), ("inertia-lag", "turn_ratio", ratio, 0.9 * ratio, 1.1 * ratio))
@@ -73,8 +99,16 @@ def test_the_note_has_both_numbers():
     assert said.startswith("understeer and the free term cancel in part: with the term in the model, loss_s_m is -0.051 s/m")
 
 
-@pytest.mark.parametrize(("rose", "said"), [((), True), (("trial",), False)])
-def test_it_is_among_the_notes_where_the_term_is_in_the_extended_model(rose, said):
+@pytest.mark.parametrize(
+    ("rose", "signal", "beside", "said"),
+    [
+        ((), "time", 3e-4, "battery-sag and the free term cancel in part"),
+        (("trial",), "time", 3e-4, ""),
+        ((), "time", 3e-5, ""),
+        ((), RESPONSE, 3e-5, "battery-sag and the free term each describe a part"),
+    ],
+)
+def test_it_is_among_the_notes_where_the_term_is_in_the_extended_model(rose, signal, beside, said):
     selection = SimpleNamespace(
         implausible={}, accepted=("battery-sag",), competing_models=(), steps=(SimpleNamespace(ranking=()),),
         fit=fit_of((*SAG, 1e-4, 0.8e-4, 1.2e-4)), nominal=SimpleNamespace(losses=np.ones(10)),
@@ -82,11 +116,11 @@ def test_it_is_among_the_notes_where_the_term_is_in_the_extended_model(rose, sai
     nothing = dict.fromkeys(("withdrawn", "unseen", "formula"))
     found = SimpleNamespace(
         **nothing, selection=selection, negligible={}, beside_negligible={}, imitating=("battery-sag",), rest=NOTHING,
-        terms=(SimpleNamespace(fit=fit_of((*SAG, 3e-4, 2.5e-4, 3.5e-4))),),
+        terms=(SimpleNamespace(fit=fit_of((*SAG, beside, 0.9 * beside, 1.1 * beside)), signal=signal),),
         errors_with_terms=SimpleNamespace(rose_in_the_end=rose, falls_in_the_end=not rose),
     )  # fmt: skip
-    notes = list(notes_on(found, tracks_of(measured(NOMINAL, trials=10)), None))
-    assert any(note.startswith("battery-sag and the free term cancel in part") for note in notes) == said
+    notes = [note for note in notes_on(found, tracks_of(measured(NOMINAL, trials=10)), None) if "the free term" in note]
+    assert [note.startswith(said) for note in notes] == ([True] if said else [])
 
 
 def test_the_sentence_takes_no_side_then(monkeypatch):
@@ -99,10 +133,18 @@ def test_the_sentence_takes_no_side_then(monkeypatch):
 
     monkeypatch.setattr("bns.diagnose.diagnosis.numbers_of", numbers_of)
     selection = SimpleNamespace(fit=without, accepted=("understeer",))
-    found = Diagnosis("unlisted", selection, terms=(SimpleNamespace(fit=beside, name="unlisted"),))
+    found = Diagnosis("unlisted", selection, terms=(SimpleNamespace(fit=beside, name="unlisted", signal="speed"),))
     number = found.numbers["understeer"]
     assert number["loss_s_m"]["cancels"]
     understeer = effect_named("understeer")
     assert sized_sentence(understeer, number) == understeer.sentence
     alone = Diagnosis("effects", selection)
     assert "less the faster" in sized_sentence(understeer, alone.numbers["understeer"])
+
+
+def test_nor_does_it_give_a_lag_of_which_a_free_response_has_the_most(monkeypatch):
+    monkeypatch.setattr("bns.diagnose.diagnosis.numbers_of", lambda fit: {"motor-lag": {"tau_s": {"value": fit.values[0]}}})
+    selection = SimpleNamespace(fit=fit_of((*LAG, 0.12, 0.11, 0.13)), accepted=("motor-lag",))
+    for signal, cancels in ((RESPONSE, True), ("speed", False)):
+        term = SimpleNamespace(fit=fit_of((*LAG, 0.02, 0.01, 0.03)), name="unlisted", signal=signal)
+        assert ("cancels" in Diagnosis("unlisted", selection, terms=(term,)).numbers["motor-lag"]["tau_s"]) is cancels

@@ -122,7 +122,7 @@ def test_terms_with_which_the_error_does_not_fall_are_in_no_extended_model(monke
     errors = PairedErrors({"trial": SimpleNamespace(total=None, changes=(Change(change, low, high),), models=MODELS)}, None, 20)
     found = Diagnosis(
         "unlisted", SimpleNamespace(fit=fits["without"], accepted=("speed-gain",)), errors_with_terms=errors,
-        terms=(SimpleNamespace(fit=fits["with"], name="unlisted"),),
+        terms=(SimpleNamespace(fit=fits["with"], name="unlisted", signal="speed"),),
     )  # fmt: skip
     result = DiagnoseResult(SimpleNamespace(model=None, measured=None), found)
     assert found.numbers == {"speed-gain": 0.8 if added else 0.9}

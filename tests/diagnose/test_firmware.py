@@ -31,6 +31,8 @@ def driven(trials=20, **effects):
         ("speed-limit-mismatch", {"max_m_s": 0.12, "left_spare": 0.25}),
         ("carpet-drift", {"x_share": 0.05, "y_share": -0.03}),
         ("command-timeout", {"timeout_s": 0.8}),
+        ("overload-trip", {"step_m_s": 0.13, "off_s": 0.2}),
+        ("supply-trip", {"step_m_s": 0.2, "off_s": 0.3}),
     ],
 )
 def test_each_is_named_with_its_numbers(name, values):

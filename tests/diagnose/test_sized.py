@@ -68,6 +68,14 @@ def number(value, low=None, high=None, **more):
             "a wheel at rest starts at 75 mm/s, and one that turns stops at 47 % of that",
         ),
         ("command-timeout", {"timeout_s": number(0.7)}, "the robot stops 700 ms after its last new command"),
+        (
+            *("overload-trip", {"step_m_s": number(0.45), "off_s": number(0.2)}),
+            "a motor is switched off for 200 ms after a change of its command by more than 450 mm/s, as by a protection",
+        ),
+        (
+            *("supply-trip", {"step_m_s": number(0.6), "off_s": number(0.2)}),
+            "both motors are switched off for 200 ms after changes of their commands by more than 600 mm/s in all, as where the",
+        ),
     ],
 )
 def test_a_sentence_follows_the_numbers(name, numbers, said):

@@ -12,7 +12,7 @@ from bns.diagnose.predict.wheels import WheelPredictor, _chain
 from bns.physics.effects import effect_named
 from bns.physics.formula import formula_effect
 from bns.physics.model import ActiveEffect
-from tests.diagnose.worlds import NOMINAL, measured
+from tests.diagnose.worlds import NOMINAL, hidden, measured
 
 
 def trial(name, left_m_s, step_s=0.5):
@@ -101,17 +101,19 @@ LATE_AND_LAGGING = {"command-delay": {"delay_s": 0.077}, "motor-lag": {"tau_s": 
 
 
 @pytest.mark.parametrize("order", [("command-delay", "motor-lag", "backlash"), ("motor-lag", "command-delay", "backlash")])
-def test_a_delay_acts_behind_the_lags_wherever_a_model_has_it(order):
+def test_a_delay_acts_behind_lags_and_play_wherever_a_model_has_it(order):
     effects = [effect_named(name) for name in order]
     model = replace(NOMINAL, effects=tuple(ActiveEffect(e, tuple(LATE_AND_LAGGING[e.name].values())) for e in effects))
-    assert [effect.name for effect, *_ in _chain(model, ("wheel",))] == ["motor-lag", "command-delay", "backlash"]
-    assert [effect.name for effect, *_ in _chain(model.without("motor-lag"), ("wheel",))] == ["command-delay", "backlash"]
+    names = [[effect.name for effect, *_ in _chain(one, ("wheel",))] for one in (model, model.without("motor-lag"))]
+    assert names == [["motor-lag", "backlash", "command-delay"], ["backlash", "command-delay"]]
+    assert [effect.name for effect, *_ in _chain(model.without("backlash"), ("wheel",))] == ["motor-lag", "command-delay"]
 
 
-def test_a_late_command_and_a_late_clock_are_alike_beside_a_lag_in_long_steps():
-    tracks = tracks_of(measured(NOMINAL, trials=3, seed=5))
+@pytest.mark.parametrize("beside", [{"motor_lag": {"tau_s": 0.08}}, {"backlash": {"gap_m": 0.004}}])
+def test_a_late_command_and_a_late_clock_are_alike_in_long_steps(beside):
+    tracks = tracks_of(measured(NOMINAL, trials=3, seed=5, speeds=(-0.2, 0.2)))
     predictor = WheelPredictor(tracks, dt_s=0.1)
-    lagging = NOMINAL.with_effect("motor-lag", tau_s=0.08)
+    lagging = hidden(**beside)
     late, clock = lagging.with_effect("command-delay", delay_s=0.077), lagging.with_effect("clock-offset", offset_s=0.077)
     apart = predictor.steps(late.arranged()).body - predictor.steps(clock.arranged()).body
     changed = predictor.steps(late.arranged()).body - predictor.steps(lagging).body

@@ -110,6 +110,38 @@ class CommandTimeout(Cause):
 
 
 @dataclass
+class OverloadTrip(Cause):
+    """A driver whose fault latches when the command it gets jumps too far, and clears by a timer: looked at in small steps."""
+
+    step_m_s: float
+    off_s: float
+
+    def jumps(self, wheels: np.ndarray) -> np.ndarray:
+        """How far each driver's commands jump at the beginning of every step, (trials, steps, 2)."""
+        return np.abs(np.diff(wheels, axis=1, prepend=0.0))
+
+    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        faults, small_s = self.jumps(wheels) > self.step_m_s, moment.step_s / FINE
+        clears_s, out = np.zeros((len(wheels), 2)), np.empty_like(wheels)
+        for i in range(wheels.shape[1]):
+            clears_s = np.where(faults[:, i], self.off_s, clears_s)
+            turns = np.zeros_like(clears_s)
+            for _ in range(FINE):
+                turns += clears_s < small_s / 2
+                clears_s = clears_s - small_s
+            out[:, i] = wheels[:, i] * turns / FINE
+        return out
+
+
+@dataclass
+class SupplyTrip(OverloadTrip):
+    """One fault for both drivers, by the sum of the jumps."""
+
+    def jumps(self, wheels: np.ndarray) -> np.ndarray:
+        return np.broadcast_to(super().jumps(wheels).sum(axis=-1, keepdims=True), wheels.shape)
+
+
+@dataclass
 class ReverseGain(Cause):
     """Half the sum of a speed and its size is what is forwards of it, the rest is backwards."""
 

@@ -99,6 +99,8 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
         {"tau_s": 0.04, "lead_s": 0.1, "swing_s": 0.12, "turn_ratio": 0.5},
     ),
     "mass-offset": ({"lead_m_s": 0.0006}, {"lead_m_s": -0.0015}),
+    "overload-trip": ({"step_m_s": 0.2, "off_s": 0.15}, {"step_m_s": 0.15, "off_s": 0.3}),
+    "supply-trip": ({"step_m_s": 0.3, "off_s": 0.15}, {"step_m_s": 0.2, "off_s": 0.4}),
 }
 """Medium and strong, of the Khepera."""
 BESIDE: dict[str, dict[str, Parameters]] = {"wheel-diameters": {"acceleration-limit": {"max_m_s2": 0.25}}}
@@ -109,6 +111,8 @@ ALIKE = {
     "wheel-patch": ("floor-patch", "uneven-patch"),
     "uneven-patch": ("floor-patch", "wheel-patch"),
     "wheel-diameters": ("wheel-mismatch",),
+    "overload-trip": ("supply-trip",),
+    "supply-trip": ("overload-trip",),
 }
 """What would stand in for an effect that is taken out: a slope is a cable from far away, and one patch contains another."""
 TURNING = {
@@ -120,10 +124,12 @@ TURNING = {
     "dead-band",
     "gear-friction",
     "mass-offset",
+    "overload-trip",
     "reversal-pause",
     "reverse-gain",
     "sliding-contact",
     "stribeck",
+    "supply-trip",
 }
 """Effects that show only where wheels reverse or turn slowly."""
 

@@ -314,6 +314,48 @@ def test_a_robot_stops_when_no_new_command_comes():
     assert curve == pytest.approx(0.5 * 0.1 / B)  # a new command of one wheel sets both going
 
 
+def test_a_motor_is_off_after_a_large_change_of_its_own_command():
+    """From rest, too; a second one while it is off starts the time anew; what is commanded then is driven for the rest."""
+    model = IDEAL.with_effect("overload-trip", step_m_s=0.15, off_s=0.25)
+    left, right, lasts = [0.2, 0.1, 0.3, 0.1, 0.1], [0.1, 0.2, 0.2, 0.2, 0.0], [0.1, 1.0, 0.1, 0.2, 1.0]
+    ends = simulate(model, [left], [right], [lasts])[0, :, 2]
+    off_left, off_right = [0.1, 0.15, 0.1, 0.2, 0.05], [0.0, 0.0, 0.0, 0.0, 0.25]
+    told = zip(left, right, lasts, off_left, off_right, strict=True)
+    turned = [(v * (h - off_r) - u * (h - off_l)) / B for u, v, h, off_l, off_r in told]
+    assert ends == pytest.approx(np.cumsum(turned))
+
+
+def test_both_motors_are_off_where_both_changes_add_up():
+    model = IDEAL.with_effect("supply-trip", step_m_s=0.25, off_s=0.4)
+    ends = simulate(model, [[0.1, 0.2, 0.05]], [[0.1, 0.3, 0.25]], [[1.0, 1.0, 1.0]])[0]
+    assert ends[0] == pytest.approx([0.1, 0.0, 0.0])
+    assert ends[1, 2] == pytest.approx(0.1 * 0.6 / B)
+    assert ends[2, 2] - ends[1, 2] == pytest.approx(0.2 / B)
+
+
+@pytest.mark.parametrize(("name", "limit"), [("overload-trip", 0.22), ("supply-trip", 0.35)])
+def test_a_limit_and_a_time_are_guessed_from_what_was_seen_or_not_at_all(name, limit):
+    """Commands of 2 s in steps of 0.1 s; a tracker that saw the wheels stand for 0.4 s after a change beyond the limit."""
+    guess, rng = effect_named(name).starts_from, np.random.default_rng(3)
+    told = np.repeat(rng.uniform(-0.3, 0.3, (2, 4, 30)), 20, axis=2)
+    changed = np.abs(np.diff(told, axis=2, prepend=0.0))
+    trips = (changed if name == "overload-trip" else np.broadcast_to(changed.sum(axis=0), changed.shape)) > limit
+    off = np.logical_or.reduce([np.roll(trips, by, axis=2) for by in range(4)])
+    off[..., :3] = trips[..., :1]
+    left, right = np.where(off, 0.0, told)
+    step = np.full(left.shape, 0.1)
+    heading = np.cumsum((right - left) / B * step, axis=1) - (right - left) / B * step / 2
+    ahead = (left + right) / 2 * step
+    x, y = (np.cumsum(ahead * f(heading), axis=1) - ahead * f(heading) / 2 for f in (np.cos, np.sin))
+    seen = np.stack([x, y, heading], axis=2)
+    starts = guess(Wheels(step, *told, B, Conditions(seen=seen)))
+    assert min(abs(start[0] - limit) for start in starts) < 0.02
+    assert min(abs(start[1] - 0.4) for start in starts) < 0.06
+    assert 1 < len(starts) <= 4
+    assert guess(Wheels(step, *told, B)) == ()
+    assert guess(Wheels(step, *np.zeros_like(told), B, Conditions(seen=seen))) == ()
+
+
 def test_a_carpet_carries_the_robot_by_a_share_of_the_distance():
     """At any speed, forwards and backwards; not in a turn on the spot."""
     model = IDEAL.with_effect("carpet-drift", x_share=0.1, y_share=-0.05)

@@ -320,7 +320,8 @@ def _gaps_and_losses(trial: str, rows: pd.DataFrame, findings: list[Finding]) ->
     if len(looked_at):
         lost, first = poses_lost(t[~left_out], _tracked(looked_at).to_numpy())
         if lost:
-            findings.append(Finding(trial, int(looked_at.index[first]), f"{lost} poses lost, the first here"))
+            many = "1 pose lost, here" if lost == 1 else f"{lost} poses lost, the first here"
+            findings.append(Finding(trial, int(looked_at.index[first]), many))
 
 
 def poses_lost(t_s: np.ndarray, tracked: np.ndarray) -> tuple[int, int]:

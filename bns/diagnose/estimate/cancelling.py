@@ -15,18 +15,21 @@ OUTGROWN = DEFAULTS.verdict.outgrown
 
 
 class Cancelled(NamedTuple):
-    """An effect of one size: its value without a term and with one that it cancels in part."""
+    """An effect of one size: its value without a term and beside one. They cancel in part, or (``divided``) share the work."""
 
     name: str
     parameter: Parameter
     without: float
     beside: float
+    divided: bool = False
 
 
-def cancelled(without: Fit, beside: Fit, accepted: Sequence[str]) -> Iterator[Cancelled]:
+def cancelled(without: Fit, beside: Fit, accepted: Sequence[str], past: bool = False) -> Iterator[Cancelled]:
     """Effects of one size that a term takes certainly to the other side of neutral, or certainly much further from it.
 
-    ``without``, ``beside``: fits without the term and with it. By the ends of 95 % intervals.
+    ``without``, ``beside``: fits without the term and with it. By the ends of 95 % intervals. ``past``: is it an answer to past
+    commands? Such a term contains lags: how much of one is in the effect, and how much in the term, is then nobody's property
+    of the robot, so effects that it takes certainly much nearer to neutral count, too.
     """
     before, after = _sizes(without), _sizes(beside)
     for name in accepted:
@@ -35,8 +38,10 @@ def cancelled(without: Fit, beside: Fit, accepted: Sequence[str]) -> Iterator[Ca
             turned = max(low, low_beside) > 0.0 > min(high, high_beside)
             within = low_beside <= 0.0 <= high_beside
             least = 0.0 if within else min(abs(low_beside), abs(high_beside))
-            if turned or least > OUTGROWN * max(abs(low), abs(high)):
-                yield Cancelled(name, p, value, value_beside)
+            least_before = 0.0 if low <= 0.0 <= high else min(abs(low), abs(high))
+            divided = past and not turned and OUTGROWN * max(abs(low_beside), abs(high_beside)) < least_before
+            if turned or divided or least > OUTGROWN * max(abs(low), abs(high)):
+                yield Cancelled(name, p, value, value_beside, divided)
 
 
 def _sizes(fit: Fit) -> dict[str, tuple[Parameter, float, float, float]]:

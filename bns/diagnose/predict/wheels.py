@@ -35,7 +35,8 @@ _KEPT = 500_000
 _UNDONE = DEFAULTS.predict.picture_rounds
 _MOVING = ("wheel", "body")
 _DELAY = "command-delay"
-_LAGS = ("motor-lag", "inertia-lag", "lag-mismatch", "braking-lag", "gear-friction", "controller-overshoot")
+_STATEFUL = ("motor-lag", "inertia-lag", "lag-mismatch", "braking-lag", "gear-friction", "controller-overshoot", "backlash")
+"""Effects behind a delay of commands to which it makes no difference whether the delay is before or behind them."""
 
 Chain = tuple[tuple[Effect, tuple[float, ...], tuple[float, ...]], ...]
 """Effects that act, their values, and those of each trial."""
@@ -266,15 +267,15 @@ class WheelPredictor:
 
 
 def _chain(model: Model, stages: Sequence[str]) -> Chain:
-    """The effects of some stages; a delay of commands behind the lags.
+    """The effects of some stages; a delay of commands behind lags and play.
 
-    Late is late, before or behind them. But a lag takes a speed as constant in a step, which a late command is not where it
-    begins within one: behind the lag the error is that of a late clock, which does the same.
+    Late is late, before or behind them. But they take a speed as constant in a step, which a late command is not where it
+    begins within one: behind them the error is that of a late clock, which does the same.
     """
     effects = [a for a in model.effects if a.effect.stage in stages]
-    lags = [i for i, a in enumerate(effects) if a.effect.name in _LAGS]
-    for i in [i for i, a in enumerate(effects) if a.effect.name == _DELAY and lags and i < lags[-1]]:
-        effects.insert(lags[-1], effects.pop(i))
+    places = [i for i, a in enumerate(effects) if a.effect.name in _STATEFUL]
+    for i in [i for i, a in enumerate(effects) if a.effect.name == _DELAY and places and i < places[-1]]:
+        effects.insert(places[-1], effects.pop(i))
     return tuple((a.effect, a.values, a.trial_values) for a in effects)
 
 

@@ -222,7 +222,8 @@ class Verdict:
         "1",
         "An effect whose number is certainly further from neutral by this factor with a free term than without it, or "
         "certainly on the other side of neutral, is said to cancel a part of that term: what is added for the rest should not "
-        f"multiply what was found before; {BY_HAND}.",
+        "multiply what was found before. With a free answer to past commands, also one that is certainly nearer by this "
+        f"factor: such an answer contains lags; {BY_HAND}.",
     )
     bins: int = setting(
         8, "bins", f"Bins, with equal numbers of values, of a curve of errors along a variable; {BY_HAND}."

@@ -37,7 +37,7 @@ def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
     """
     if wheels.conditions.seen is None:
         return ()
-    told, saw = np.stack([wheels.left_m_s, wheels.right_m_s]), _seen_speeds(wheels)
+    told, saw = np.stack([wheels.left_m_s, wheels.right_m_s]), seen_speeds(wheels)
     gain = np.nan_to_num(told * (2.0 * saw - told)) * wheels.step_s
     told, gain = (values.reshape(-1, told.shape[-1]) for values in (np.abs(told), gain))
     fastest = float(np.quantile(told[told > 0], 0.99)) if (told > 0).any() else 0.0
@@ -57,7 +57,7 @@ def _best(told: Array, gain: Array, starts: Array, stops: Array) -> tuple[float,
     return float(start[best]), float(stop[best])
 
 
-def _seen_speeds(wheels: Wheels) -> Array:
+def seen_speeds(wheels: Wheels) -> Array:
     """Of both wheels, (2, batch, steps): between the steps before and after each; NaN where that was not seen."""
     seen, out = wheels.conditions.seen, np.full((2, *wheels.step_s.shape), np.nan)
     if seen is None or seen.shape[1] < 3:

@@ -72,3 +72,31 @@ def timed_out(left: Array, right: Array, step_s: Array, timeout_s: float) -> tup
             mean_left[row, k], mean_right[row, k] = share * u, share * v
             since_s += h
     return mean_left, mean_right
+
+
+@exact
+def tripped(left: Array, right: Array, step_s: Array, limit: float, off_s: float, together: bool) -> tuple[Array, Array]:
+    """Mean over each step of two speeds that are 0 for ``off_s`` after a change beyond a limit, in size; exact.
+
+    Of each by itself, or of both ``together`` after changes that exceed it when added up. Each such change starts the time anew.
+    """
+    mean_left, mean_right = np.zeros_like(left), np.zeros_like(right)
+    for row in range(left.shape[0]):
+        before_left = before_right = off_left = off_right = 0.0
+        for k in range(left.shape[1]):
+            h, u, v = step_s[row, k], left[row, k], right[row, k]
+            if h == 0.0:
+                continue
+            by_left, by_right = abs(u - before_left), abs(v - before_right)
+            before_left, before_right = u, v
+            if together:
+                by_left += by_right
+                by_right = by_left
+            if by_left > limit:
+                off_left = off_s
+            if by_right > limit:
+                off_right = off_s
+            mean_left[row, k] = u * (1.0 - min(off_left, h) / h)
+            mean_right[row, k] = v * (1.0 - min(off_right, h) / h)
+            off_left, off_right = max(off_left - h, 0.0), max(off_right - h, 0.0)
+    return mean_left, mean_right
