@@ -11,7 +11,7 @@ from scipy.special import stdtr
 from bns.diagnose.data.stamps import stamp_scatter
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.data.variables import bare, label, velocity
-from bns.diagnose.estimate.cancelling import Cancelled, cancelled
+from bns.diagnose.estimate.cancelling import cancelled
 from bns.diagnose.estimate.plausibility import known_together, with_unit
 from bns.diagnose.estimate.smoothing_tracker import LATE, smoothing_tracker
 from bns.diagnose.outcome import Outcome
@@ -94,6 +94,7 @@ def notes_on(
         said = f"{formula_in_words}: " if formula_in_words else ""
         yield f"A candidate term: {said}{formula.on} + {formula.term} with {values}."
     yield from _on_terms(found, terms, tracks)
+    yield from _on_undescribed(found)
     if hint is not None:
         more = int(np.ceil(len(tracks) * max((3.2 / max(hint.paired_comparison.z, 0.5)) ** 2 - 1, 0.5)))
         yield f"{hint.name} may be missing, but {len(tracks)} trials are too few to decide; about {more} more would decide."
@@ -114,8 +115,25 @@ def _on_terms(found: Outcome, terms: Sequence[str], tracks: Tracks) -> Iterator[
     yield from (f"What no listed effect explains behaves like this: {words}." for words in terms)
     if found.terms:
         past = any(term.signal in PAST for term in found.terms)
-        yield from map(_on_cancelling, cancelled(selection.fit, found.terms[0].fit, selection.accepted, past))
+        yield from (one.in_words for one in cancelled(selection.fit, found.terms[0].fit, selection.accepted, past))
         yield _on_reach(tracks)
+
+
+def _on_undescribed(found: Outcome) -> Iterator[str]:
+    """On effects beside something that no term describes: nothing tells how much of it they stand for."""
+    with_terms, names = found.errors_with_terms, found.selection.accepted
+    described = bool(found.terms) and (with_terms is None or with_terms.falls_in_the_end)
+    if described or not names or not found.rest.any:
+        return
+    known = {h: one for h, one in found.errors.horizons.items() if one.models and one.noise_floor_m > 0}
+    at = max(known, key=lambda h: known[h].models[-1].rms_m / known[h].noise_floor_m, default="")
+    error, noise = (f"{1e3 * m:.3g} mm" for m in (known[at].models[-1].rms_m, known[at].noise_floor_m)) if at else ("", "")
+    sizes = f" (error over {IN_WORDS[at]}: {error}; by noise alone: {noise})" if at else ""
+    it, them = ("it", "this effect") if len(names) == 1 else ("they", "these effects")
+    yield (
+        f"No term describes what is left beside {' and '.join(names)}{sizes}, so {it} may stand for a part of that. The "
+        f"intervals hold only if what is left has nothing to do with {them}."
+    )
 
 
 def _on_reach(tracks: Tracks) -> str:
@@ -125,22 +143,6 @@ def _on_reach(tracks: Tracks) -> str:
     return (
         f"The free terms describe what this log has driven (wheels from {low:.3g} to {high:.3g} m/s, and turns as quick as "
         "these). Beyond that they are a guess: drive what you will ask of the model, and give it as --more."
-    )
-
-
-def _on_cancelling(each: Cancelled) -> str:
-    """On an effect and a free term that cancel in part, or that do a part of the same work each."""
-    p = each.parameter
-    if each.divided:
-        return (
-            f"{each.name} and the free term each describe a part of the same delay: with the term in the model, {p.name} is "
-            f"{each.beside:.3g}{with_unit(p.unit)}, and {each.without:.3g} without it. Only both together are determined: do not "
-            f"read {p.name} by itself."
-        )
-    return (
-        f"{each.name} and the free term cancel in part: with the term in the model, {p.name} is {each.beside:.3g}"
-        f"{with_unit(p.unit)}, and {each.without:.3g} without it. What acts may be neither of the two, but something that only "
-        f"both together describe (such as friction that changes along the session): do not read {p.name} by itself."
     )
 
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.diagnose.caveats import _on_cancelling, notes_on
+from bns.diagnose.caveats import notes_on
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.cancelling import Cancelled, cancelled
@@ -73,7 +73,7 @@ def test_a_lag_of_which_a_free_response_takes_the_most_is_not_to_be_read_by_itse
     perhaps_none = fit_of((*LAG, 0.12, -0.1, 0.3))
     assert not list(cancelled(perhaps_none, fits[1], ("motor-lag",), past))
     for one in found:
-        said = _on_cancelling(one)
+        said = one.in_words
         assert said.startswith("motor-lag and the free term each describe a part of the same delay: with the term")
         assert said.endswith("and 0.12 without it. Only both together are determined: do not read tau_s by itself.")
 
@@ -95,7 +95,7 @@ def test_of_an_effect_with_several_numbers_none_is_said_to_have_outgrown_the_oth
 
 
 def test_the_note_has_both_numbers():
-    said = _on_cancelling(Cancelled("understeer", number_of("understeer", "loss_s_m"), 0.201, -0.051))
+    said = Cancelled("understeer", number_of("understeer", "loss_s_m"), 0.201, -0.051).in_words
     assert said.startswith("understeer and the free term cancel in part: with the term in the model, loss_s_m is -0.051 s/m")
 
 

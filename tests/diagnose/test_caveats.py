@@ -19,6 +19,7 @@ from bns.diagnose.caveats import (
     _on_rest,
     _on_terms,
     _on_times,
+    _on_undescribed,
     implausible_text,
     notes_on,
     on_worst,
@@ -326,6 +327,34 @@ def test_of_a_few_clocks_only_a_correlation_that_is_hardly_luck_is_a_drift(r, sa
     notes = list(_on_drift("clock-offset", start_s, 0.01 * (r * along + np.sqrt(1 - r * r) * beside)))
     assert bool(notes) == said
     assert not said or f"(correlation {r:+.2f})" in notes[0]
+
+
+def left_beside(names, terms, falls, noise_m, left=True):
+    """As an `Outcome`: 27 mm are left over a command and 15 mm over a second."""
+    at = {
+        h: SimpleNamespace(models=[SimpleNamespace(rms_m=rms_m)], noise_floor_m=noise_m)
+        for h, rms_m in (("1s", 0.015), ("command", 0.027))
+    }
+    with_terms = SimpleNamespace(falls_in_the_end=falls) if terms else None
+    selection = SimpleNamespace(accepted=names)
+    rest, errors = SimpleNamespace(any=left), SimpleNamespace(horizons=at)
+    return SimpleNamespace(selection=selection, terms=terms, errors_with_terms=with_terms, rest=rest, errors=errors)
+
+
+@pytest.mark.parametrize(("terms", "falls", "said"), [((), None, True), (("a curve",), False, True), (("a curve",), True, False)])
+def test_effects_beside_what_no_term_describes_may_stand_for_a_part_of_it(terms, falls, said):
+    found = list(_on_undescribed(left_beside(("motor-lag", "backlash"), terms, falls, 0.003)))
+    assert found == [
+        "No term describes what is left beside motor-lag and backlash (error over one command: 27 mm; by noise alone: 3 mm), so "
+        "they may stand for a part of that. The intervals hold only if what is left has nothing to do with these effects."
+    ][: int(said)]
+    assert not list(_on_undescribed(left_beside(("motor-lag",), terms, falls, 0.003, left=False)))
+    assert not list(_on_undescribed(left_beside((), terms, falls, 0.003)))
+
+
+def test_where_the_noise_is_not_known_no_size_is_given():
+    (found,) = _on_undescribed(left_beside(("motor-lag",), (), None, float("nan")))
+    assert found.startswith("No term describes what is left beside motor-lag, so it may stand for a part of that.")
 
 
 def test_terms_are_said_to_hold_for_what_was_driven():

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.plausibility import with_unit
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Parameter
 
@@ -22,6 +23,22 @@ class Cancelled(NamedTuple):
     without: float
     beside: float
     divided: bool = False
+
+    @property
+    def in_words(self) -> str:
+        """A sentence or two with both numbers."""
+        name, p = self.name, self.parameter
+        beside = f"{self.beside:.3g}{with_unit(p.unit)}"
+        numbers = f"with the term in the model, {p.name} is {beside}, and {self.without:.3g} without it"
+        if self.divided:
+            return (
+                f"{name} and the free term each describe a part of the same delay: {numbers}. Only both together are determined: "
+                f"do not read {p.name} by itself."
+            )
+        return (
+            f"{name} and the free term cancel in part: {numbers}. What acts may be neither of the two, but something that only "
+            f"both together describe (such as friction that changes along the session): do not read {p.name} by itself."
+        )
 
 
 def cancelled(without: Fit, beside: Fit, accepted: Sequence[str], past: bool = False) -> Iterator[Cancelled]:
