@@ -108,7 +108,8 @@ def test_the_note_has_both_numbers():
         ((), RESPONSE, 3e-5, "battery-sag and the free term each describe a part"),
     ],
 )
-def test_it_is_among_the_notes_where_the_term_is_in_the_extended_model(rose, signal, beside, said):
+def test_it_is_among_the_notes_where_the_term_is_in_the_extended_model(monkeypatch, rose, signal, beside, said):
+    monkeypatch.setattr("bns.diagnose.caveats._on_undescribed", lambda found: ["on what is left"])
     selection = SimpleNamespace(
         implausible={}, accepted=("battery-sag",), competing_models=(), steps=(SimpleNamespace(ranking=()),),
         fit=fit_of((*SAG, 1e-4, 0.8e-4, 1.2e-4)), nominal=SimpleNamespace(losses=np.ones(10)),
@@ -119,7 +120,9 @@ def test_it_is_among_the_notes_where_the_term_is_in_the_extended_model(rose, sig
         terms=(SimpleNamespace(fit=fit_of((*SAG, beside, 0.9 * beside, 1.1 * beside)), signal=signal),),
         errors_with_terms=SimpleNamespace(rose_in_the_end=rose, falls_in_the_end=not rose),
     )  # fmt: skip
-    notes = [note for note in notes_on(found, tracks_of(measured(NOMINAL, trials=10)), None) if "the free term" in note]
+    every = list(notes_on(found, tracks_of(measured(NOMINAL, trials=10)), None))
+    assert "on what is left" in every
+    notes = [note for note in every if "the free term" in note]
     assert [note.startswith(said) for note in notes] == ([True] if said else [])
 
 
