@@ -187,6 +187,20 @@ def test_rows_of_commands_alone_are_no_lost_poses():
     assert poses_lost(np.arange(20.0), np.arange(20) > 0) == (1, 0)
 
 
+def test_frames_that_come_at_uneven_times_are_not_lost():
+    """Frames every 30 to 100 ms, and commands in rows of their own; of every twentieth frame the row is there, and no pose."""
+    rng = np.random.default_rng(2)
+    frames = np.cumsum(rng.uniform(0.03, 0.1, 400))
+    commands = np.arange(0.05, frames[-1], 0.1) + 1e-4
+    gone = np.arange(400) % 20 == 10
+    t_s = np.concatenate([frames, commands])
+    tracked = np.concatenate([~gone, np.zeros(len(commands), dtype=bool)])[np.argsort(t_s)]
+    lost, _ = poses_lost(np.sort(t_s), tracked)
+    assert 5 <= lost <= 20  # two short gaps together may be as long as one that is usual
+    whole = np.concatenate([np.ones(400, dtype=bool), np.zeros(len(commands), dtype=bool)])[np.argsort(t_s)]
+    assert poses_lost(np.sort(t_s), whole)[0] == 0
+
+
 @pytest.mark.parametrize("phase", [0.01, 0.31, 0.5, 0.9, 0.99])
 def test_a_command_before_the_first_pose_is_no_lost_pose_whenever_the_tracker_comes(phase):
     t = np.concatenate([[0.0], phase + np.arange(20.0)])

@@ -83,7 +83,7 @@ def test_an_effect_is_undetermined_where_all_its_numbers_may_be_anything_and_lim
     names = (GAIN, replace(GAIN, name="lag"))
     free = tuple(FreeParameter("e", p) for p, _ in zip(names, intervals, strict=False))
     other = FreeParameter("other", GAIN)
-    fit = SimpleNamespace(free=(*free, other), interval=lambda i: [*intervals, (0.1, 9.0)][i])
+    fit = SimpleNamespace(free=(*free, other), values=[1.0] * 3, interval=lambda i: [*intervals, (0.1, 9.0)][i])
     assert undetermined(fit, "e") == said
     assert limiting(fit, "e") is may_be_anything
 

@@ -105,7 +105,7 @@ def test_what_is_no_response_to_a_step_is_not_described_as_one(term):
         (NOMINAL, "after a change of its command a wheel has half of the new speed within 0.04 s, and"),
         (
             NOMINAL.with_effect("motor-lag", tau_s=0.2),
-            "after a change of its command, as the effects of the wheels leave it, a wheel has half of the new speed within 0",
+            "after a change of its command, beyond what the effects of the wheels do to it, a wheel has half of the new speed",
         ),
     ],
 )
@@ -145,7 +145,7 @@ def test_a_robot_that_goes_ahead_more_slowly_than_it_turns_is_described_beside_i
     assert found.names == ("motor-lag",)
     assert found.fit.model.values_of("motor-lag")["tau_s"] == pytest.approx(0.06, abs=0.01)
     assert [term.signal for term in found.terms][:1] == [RESPONSE_OF["v"]]
-    begun = "after a change of its command, as the effects of the wheels leave it, the robot's forward motion has half"
+    begun = "after a change of its command, beyond what the effects of the wheels do to it, the robot's forward motion has half"
     assert in_words(found.terms[0], predictor).startswith(begun)
 
 

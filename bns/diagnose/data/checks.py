@@ -20,6 +20,7 @@ from bns.errors import DataError
 from bns.measurements import COLUMNS, LEFT_OUT, POSE, RUN_UP
 
 _HELD = DEFAULTS.data.held_share
+_USUAL = DEFAULTS.data.usual_gaps
 _JUMP_M = DEFAULTS.data.jump_m
 _JUMP_RAD = DEFAULTS.data.jump_rad
 _JUMP_ROUNDS = DEFAULTS.data.jump_rounds
@@ -345,11 +346,16 @@ def rows_of_losses(t_s: np.ndarray, tracked: np.ndarray) -> np.ndarray:
 
 
 def _losses(t_s: np.ndarray, tracked: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Between one pose and the next (poses + 1,): how many are lost; and the rows of the poses, -1 and the end around them."""
+    """Between one pose and the next (poses + 1,): how many are lost; and the rows of the poses, -1 and the end around them.
+
+    A tracker that comes at uneven times leaves long gaps too: those without a row between their poses show how long.
+    """
     at = np.flatnonzero(tracked)
-    usual = float(np.median(np.diff(t_s[at])))
+    gaps = np.diff(t_s[at])
+    usual, whole = float(np.median(gaps)), gaps[np.diff(at) == 1]
+    longest = max(usual, float(np.quantile(whole, _USUAL))) if len(whole) else usual
     marks = np.concatenate([[-1], at, [len(t_s)]])
     most = 0.501 * usual  # before the first and after the last pose one is due only where a whole interval passes
     times = np.concatenate([[t_s[0] - most], t_s[at], [t_s[-1] + most]])
-    due = np.maximum(np.round(np.diff(times) / usual) - 1, 0)
+    due = np.where(np.round(np.diff(times) / longest) > 1, np.maximum(np.round(np.diff(times) / usual) - 1, 0), 0)
     return np.minimum(np.diff(marks) - 1, due).astype(int), marks

@@ -70,8 +70,12 @@ def undetermined(fit: Fit, name: str) -> str:
 
 
 def limiting(fit: Fit, name: str) -> bool:
-    """Whether a number of an effect may be anything, so that the effect does the work of a shorter one."""
-    return any(_spans(fit, i) for i, number in enumerate(fit.free) if number.effect == name)
+    """Whether a number of an effect may be anything, so that the effect does the work of a shorter one.
+
+    So it is, too, where it is as long as a trial or as the floor is wide, and would be longer: the log sets no end to it.
+    """
+    own = [(i, number.parameter, fit.values[i]) for i, number in enumerate(fit.free) if number.effect == name]
+    return any(_spans(fit, i) or bool((p.trial_share or p.floor_share) and value == p.high) for i, p, value in own)
 
 
 def does_nothing(fit: Fit, name: str) -> bool:

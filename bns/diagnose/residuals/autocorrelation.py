@@ -62,7 +62,7 @@ class Autocorrelation:
         seen = f"correlation {self.correlation:+.2f}"
         if self.period_s is not None:
             swings = f"swings to and fro with a period of about {self.period_s:.2g} s, {1 / self.period_s:.2g} Hz"
-            cause = "something oscillates that no logged variable shows, such as a marker that sways"
+            cause = "something oscillates that no logged variable shows, such as a load or a marker that sways"
             return f"{motion} {swings} ({seen} {after}): {cause}."
         if self.correlation < 0:
             return f"{motion} is opposite {after} ({seen}): something swings back that no logged variable shows."

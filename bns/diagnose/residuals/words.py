@@ -317,7 +317,7 @@ def _response(term: Formula, _: Predictor) -> str:
 def _left_of(term: Formula) -> str:
     """That a response begins from what the effects of the wheels leave of a command, where the model has any."""
     on_wheels = any(active.effect.stage == "wheel" for active in term.fit.model.effects)
-    return ", as the effects of the wheels leave it," if on_wheels else ""
+    return ", beyond what the effects of the wheels do to it," if on_wheels else ""
 
 
 def _later(term: Formula) -> str:
