@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
+from analysis.approach_order import in_order
 from analysis.approach_runs import groups, on_the_same_seeds, pooled_over, titled, varied_in_any
 from analysis.approach_summary import of_each_run
 from analysis.figure_result import FigureResult
@@ -17,7 +18,6 @@ from analysis.intervals import FEWEST_SEEDS, band
 from analysis.multiple_tests import holm
 from analysis.results import NoDataError, Results, among
 from analysis.robot_time import LASTING, minutes_until_lasting
-from analysis.selection import in_order
 from bns.plotting.style import lettered, note, panels, style
 
 NAME = "approach-pairs"

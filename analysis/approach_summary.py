@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from analysis.approach_order import in_order
 from analysis.approach_runs import OTHERS, done, groups, none_alike, on_the_same_seeds, pooled_over, with_settings
 from analysis.figure_result import FigureResult
 from analysis.intervals import bootstrap
 from analysis.results import Results
-from analysis.selection import in_order
 
 NAME = "approach-summary"
 PAPER = "section 2.6, its approaches compared with BNS"

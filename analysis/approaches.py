@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from analysis.approach_order import Look, in_order, looks
 from analysis.approach_runs import (
     GROUP,
     OTHERS,
@@ -32,14 +35,12 @@ from analysis.robot_time import (
     success_by_minute,
     survival,
 )
-from analysis.selection import in_order
-from bns.plotting.style import GREY, OKABE_ITO, PAGE_IN, TEXT_PT, lettered, note, style
+from bns.plotting.style import GREY, PAGE_IN, TEXT_PT, lettered, note, style
 
 NAME = "approaches"
 PAPER = "section 2.6, its approaches compared with BNS"
 MINUTES = 60
 _ACROSS = 3
-_LINES = ("-", "--")
 
 
 def draw(store: Results) -> list[FigureResult]:
@@ -54,7 +55,8 @@ def draw(store: Results) -> list[FigureResult]:
     comparable = [own for own in map(_comparable, several) if len(own)]
     if not comparable:
         raise none_alike(several)
-    return [_draw(own) for own in comparable]
+    look = looks(evals.approach)
+    return [_draw(own, look) for own in comparable]
 
 
 def _comparable(evals: pd.DataFrame) -> pd.DataFrame:
@@ -63,11 +65,10 @@ def _comparable(evals: pd.DataFrame) -> pd.DataFrame:
 
 
 @style()
-def _draw(evals: pd.DataFrame) -> FigureResult:
+def _draw(evals: pd.DataFrame, look: Mapping[str, Look]) -> FigureResult:
     first = evals.iloc[0]
     bands, unit = (POOLED, "seeds") if varied(evals) else (f"bands: {INTERVALS}", "runs")
     approaches = in_order(evals.approach)
-    looks = {name: {"color": OKABE_ITO[i % 7], "linestyle": _LINES[i // 7 % 2]} for i, name in enumerate(approaches)}
     rows = -(-len(approaches) // _ACROSS)
     figure = Figure(figsize=(PAGE_IN, 3.4 + 1.5 * rows))
     above, below = figure.subfigures(2, 1, height_ratios=(3.4, 1.5 * rows))
@@ -77,11 +78,11 @@ def _draw(evals: pd.DataFrame) -> FigureResult:
     horizon = float(evals.groupby("approach").robot_s.max().min()) / 60
     for name, ax in zip(approaches, singles, strict=False):
         by_evaluation, by_minute, until = numbers[name]
-        _curve(axes[0], by_evaluation.evaluation, by_evaluation, looks[name], name)
-        _curve(axes[1], by_minute.minute, by_minute, looks[name], name)
+        _curve(axes[0], by_evaluation.evaluation, by_evaluation, look[name], name)
+        _curve(axes[1], by_minute.minute, by_minute, look[name], name)
         times, share = survival(until.minutes, until.ended)
-        axes[2].step([*times, until.minutes.max()], [*(100 * share), 100 * share[-1]], where="post", **looks[name])
-        _single(ax, by_minute, numbers[approaches[0]][1], looks[name])
+        axes[2].step([*times, until.minutes.max()], [*(100 * share), 100 * share[-1]], where="post", **look[name])
+        _single(ax, by_minute, numbers[approaches[0]][1], look[name])
         ax.set_title(name)
     for blank in singles[len(approaches) :]:
         blank.set_axis_off()
@@ -136,11 +137,11 @@ def _by_evaluation(latest: pd.DataFrame) -> pd.DataFrame:
     return counts.assign(low=low, high=high)
 
 
-def _curve(ax: Axes, x: pd.Series, rows: pd.DataFrame, look: dict[str, str], label: str) -> None:
+def _curve(ax: Axes, x: pd.Series, rows: pd.DataFrame, look: Look, label: str) -> None:
     ax.plot(x, 100 * rows.successes / rows.runs, label=label, **look)
 
 
-def _single(ax: Axes, rows: pd.DataFrame, reference: pd.DataFrame, look: dict[str, str]) -> None:
+def _single(ax: Axes, rows: pd.DataFrame, reference: pd.DataFrame, look: Look) -> None:
     """One approach by robot time, with its band, before the reference."""
     ax.plot(reference.minute, 100 * reference.successes / reference.runs, color=GREY, linewidth=0.8)
     ax.fill_between(rows.minute, 100 * rows.low, 100 * rows.high, color=look["color"], alpha=0.2, linewidth=0)

@@ -18,7 +18,7 @@ from bns.errors import BnsError, SpecError, StoreError
 from bns.spec import FIELDS
 from bns.store.archive.kept import NEAR, RECORDED, rounded_evals, rounded_rows
 from bns.store.archive.read import archives, connect_archives, recorded_tables
-from bns.sweep.expand.grid import parse_sweep
+from bns.sweep.expand.grid import parse_stored
 
 BEGIN = "bns sweep khepera-small --budget 10m"
 OF_RUNS = ("runs", "evals", "paths", "generations", "probes")
@@ -119,7 +119,7 @@ class Results:
             "SELECT sweep, arg_max(text, written_at) AS text, arg_max(runs, written_at) AS runs "
             "FROM specs GROUP BY sweep ORDER BY sweep"
         )
-        return {row.sweep: _plan(row.text, row.runs) for row in newest.itertuples()}
+        return {row.sweep: _plan(row.sweep, row.text, row.runs) for row in newest.itertuples()}
 
 
 def _lacking(fault: Exception) -> str:
@@ -129,9 +129,9 @@ def _lacking(fault: Exception) -> str:
     return f"{found[1].lower()} {found[2]}" if found else first
 
 
-def _plan(text: str, runs: float) -> Plan:
+def _plan(name: str, text: str, runs: float) -> Plan:
     try:
-        sweep = parse_sweep(text, Path("the stored sweep file"))
+        sweep = parse_stored(text, name)
     except SpecError:  # written for another version of bns: its size is known all the same
         return Plan(0 if pd.isna(runs) else int(runs), 0, frozenset())
     varied = {

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
 
+from analysis.approach_order import in_order
 from analysis.labels import CELL, TITLES, counted, task_order
 from analysis.results import BEGIN, NoDataError, Results, among, remembered
 from bns.sweep.confirm import confirmed_name
@@ -158,8 +159,3 @@ def failures(store: Results, sweeps: Sequence[str]) -> int:
         store.query(f"""SELECT count(*) AS n FROM (SELECT run_id FROM runs WHERE {among("sweep", sweeps)}
         GROUP BY run_id HAVING count(*) FILTER (status = 'ok') = 0)""").n[0]
     )
-
-
-def in_order(approaches: Iterable[str]) -> list[str]:
-    """By name, BNS and its options first."""
-    return sorted(set(approaches), key=lambda name: (name.split("+")[0] != "bns", name))

@@ -29,12 +29,13 @@ class RunRecord:
     ``run`` holds status (ok, failed, quarantined), started_at (datetime with a zone), wall_s, cpu_s, attempts
     and, where known, error, world_digest and peak_memory_mib; with the columns of `Provenance` where the run was
     carried out by another machine than it is stored by. ``tables`` maps table names to columns of equal
-    length without the identity columns; a run that is not ok has none.
+    length without the identity columns; a run that is not ok has none. ``heard``: warnings that came meanwhile; not stored.
     """
 
     spec: RunSpec
     run: Mapping[str, Any]
     tables: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
+    heard: tuple[str, ...] = ()
 
 
 def record_tables(record: RunRecord, provenance: Provenance) -> dict[str, pa.Table]:

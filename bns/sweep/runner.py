@@ -21,6 +21,7 @@ from bns.sweep.expand.order import ordered_specs
 from bns.sweep.expand.shard import Shard
 from bns.sweep.interrupt import GRACE_S, Interrupts
 from bns.sweep.jobs.executor import Executor, Job
+from bns.sweep.jobs.heard import Heard
 from bns.sweep.jobs.job import check_world_files, names_a_file, prepare, run_job
 from bns.sweep.jobs.workers import LokyExecutor
 
@@ -104,6 +105,8 @@ def run_sweep(
         except KeyboardInterrupt:
             if sweep_run.interrupts.stopped_by is None:
                 raise
+        finally:
+            sweep_run.heard.sum_up()
     return sweep_run.summary()
 
 
@@ -122,6 +125,7 @@ class _SweepRun:
         self._sweep, self._on_progress, self._shard = sweep, on_progress, shard
         self._total = sweep.total
         self._digests = WorldDigests(results, sweep.name)
+        self.heard = Heard()
         self._statuses: dict[str, str] = {}
         self._counts: Counter[str] = Counter()
         self._new = self._new_failed = self._submitted = self._todo = self._wanted = 0
@@ -188,6 +192,7 @@ class _SweepRun:
         self._new += 1
         self._new_failed += record.run["status"] != "ok"
         self._on_progress(self.summary())
+        self.heard.add(record)
 
     def _count(self, run_id: str, status: str) -> None:
         self._counts.subtract([self._statuses.get(run_id, "none")])

@@ -15,7 +15,7 @@ from bns.spec import RunSpec
 from bns.store.archive.read import connect_archives, stored_archives
 from bns.store.read.reader import finished, load
 from bns.store.read.snapshot import snapshot
-from bns.sweep.expand.grid import Sweep, parse_sweep
+from bns.sweep.expand.grid import Sweep, parse_stored
 
 if TYPE_CHECKING:  # a third of a second to load, and a sweep needs no table
     import pandas as pd
@@ -139,7 +139,7 @@ def _newest_files(specs: pd.DataFrame) -> dict[str, Sweep]:
     files = {}
     for name, group in specs.sort_values("written_at").groupby("sweep"):
         try:
-            files[str(name)] = parse_sweep(group["text"].iloc[-1], Path(f"{name}.yaml"))
+            files[str(name)] = parse_stored(group["text"].iloc[-1], str(name))
         except SpecError:
             continue  # written by another version: what it describes is not known
     return files

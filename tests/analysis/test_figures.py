@@ -9,6 +9,7 @@ from analysis import budget, paths, scatter, success_by_diversity, success_by_mu
 from analysis.__main__ import figures
 from analysis.intervals import POOLED, pooled, wilson
 from analysis.results import NoDataError, Results
+from bns.errors import SweepWarning
 from bns.plotting.style import COLUMN_IN, PAGE_IN, TEXT_PT
 from bns.spec import RunSpec
 from bns.store import Writer, load
@@ -251,6 +252,14 @@ def test_failed_and_planned_runs_are_stated_on_the_figure(tmp_path, texts):
     for part in ("2 of 9 runs so far", "1 of 3 combinations without a finished run", "1 failed run not shown"):
         assert part in said
         assert part in drawn.missing
+
+
+def test_a_plan_of_an_older_version_with_a_value_twice_is_read(tmp_path):
+    text = "name: grid\nrobot: khepera\nseeds: 3\nfixed: {evaluations: 4, task: circle}\ngrid: {mutation_rate: [0.1, 0.5, 0.1]}"
+    written(tmp_path, "grid", [record(spec) for spec in specs(1)], sweep_text=text, sweep_runs=6)
+    with pytest.warns(SweepWarning, match="mutation_rate: 0.1"):
+        plan = Results(tmp_path).plans["grid"]
+    assert (plan.runs, plan.cells, plan.varied) == (6, 2, {"mutation_rate"})
 
 
 def test_one_run_of_a_planned_grid_is_drawn_with_its_wide_interval(tmp_path):

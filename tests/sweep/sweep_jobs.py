@@ -3,6 +3,7 @@
 import os
 import signal
 import time
+import warnings
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -67,6 +68,27 @@ def slow(spec: RunSpec) -> RunRecord:
 def endless(spec: RunSpec) -> RunRecord:
     mark(f"begun-{spec.run_id}-{os.getpid()}")
     time.sleep(300)
+    return ok(spec)
+
+
+def warning(spec: RunSpec) -> RunRecord:
+    """One warning of all runs, twice; one of population 10; one a run."""
+    for _ in range(2):
+        warnings.warn("the floor is not level", stacklevel=1)
+    if spec.population_size == 10:
+        warnings.warn("a small population", RuntimeWarning, stacklevel=1)
+    warnings.warn(f"seed {spec.seed} of {spec.population_size}", stacklevel=1)
+    return ok(spec)
+
+
+def warning_and_faulty(spec: RunSpec) -> RunRecord:
+    warnings.warn("about to fail", stacklevel=1)
+    raise ValueError("no")
+
+
+def warning_and_killed(spec: RunSpec) -> RunRecord:
+    warnings.warn("about to die", stacklevel=1)
+    os.kill(os.getpid(), signal.SIGKILL)
     return ok(spec)
 
 

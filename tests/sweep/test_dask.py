@@ -18,7 +18,7 @@ pytest.importorskip("distributed")
 from dask_cluster import Cluster
 from distributed import Client
 
-from bns.errors import ClusterError
+from bns.errors import ClusterError, SweepWarning
 from bns.store import load
 from bns.sweep.expand.order import ordered_specs
 from bns.sweep.jobs import dask_link
@@ -54,6 +54,15 @@ def test_same_evals_as_of_one_process(cluster, tmp_path):
     assert (summary.done, summary.stopped_by) == (8, None)
     pd.testing.assert_frame_equal(load(tmp_path / "dask"), load(tmp_path / "one"))
     assert set(load(tmp_path / "dask", "runs")["attempts"]) == {1}
+
+
+def test_warnings_of_the_workers_come_back_with_the_runs(cluster, tmp_path):
+    with pytest.warns(SweepWarning) as caught:
+        carry_out(cluster, tmp_path, sweep_jobs.warning)
+    said = [str(one.message).rpartition(" (")[0] for one in caught if issubclass(one.category, SweepWarning)]
+    assert sum("the floor is not level" in text for text in said) == 2
+    counts = ["in 2 runs: RuntimeWarning: a small population", "in 8 runs: UserWarning: the floor is not level"]
+    assert sorted(said[-2:]) == counts
 
 
 def test_a_fault_in_a_run_is_a_failed_row_and_its_worker_lives(cluster, tmp_path):

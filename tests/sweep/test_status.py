@@ -10,12 +10,12 @@ import pytest
 import sweep_jobs
 from sweep_jobs import make_sweep
 
-from bns.errors import StoreError, SweepWarning
+from bns.errors import SpecError, StoreError, SweepWarning
 from bns.spec import RunSpec
 from bns.store.archive.write import archive
 from bns.store.read.reader import load
 from bns.store.record import RunRecord
-from bns.sweep.expand.grid import parse_sweep
+from bns.sweep.expand.grid import parse_stored, parse_sweep
 from bns.sweep.forecast.pace import Pace
 from bns.sweep.forecast.plan import START_UP_S, plan, work
 from bns.sweep.jobs.executor import SerialExecutor
@@ -278,3 +278,26 @@ def test_rate_and_time_to_go():
     summary = Summary("demo", 100, done=40, failed=2, quarantined=1, new=10)
     assert describe_rate(summary, 60.0) == "10.0/min, 0:05:42 to go, 3 failed"
     assert describe_rate(Summary("demo", 100), 0.0) == ""
+
+
+TWICE = """
+name: demo
+robot: khepera
+seeds: 2
+fixed: {evaluations: 3}
+grid: {population_size: [10, 11, 10], mutation_rate: [0.1, 0.1]}
+"""
+
+
+def test_a_stored_file_with_values_that_come_twice_is_read_as_it_was_run_with_one_warning(tmp_path):
+    """Older versions took such files; a new one is refused."""
+    with pytest.raises(SpecError, match="population_size has the value 10 twice"):
+        parse_sweep(TWICE, tmp_path / "x.yaml")
+    once = parse_sweep(TWICE.replace("10, 11, 10", "10, 11").replace("0.1, 0.1", "0.1"), tmp_path / "x.yaml")
+    serial(replace(once, text=TWICE), tmp_path)
+    with pytest.warns(SweepWarning, match=r"sweep 'demo' .* values twice \(population_size: 10, mutation_rate: 0.1\)") as said:
+        rows = sweep_status(tmp_path)
+    assert len(said) == 1
+    assert [(row.task, row.done, row.total, row.remaining, row.other) for row in rows] == [("circle", 4, 4, 0, 0)]
+    with pytest.warns(SweepWarning, match="values twice"):
+        assert parse_stored(TWICE, "demo").combos == once.combos

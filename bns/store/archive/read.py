@@ -27,7 +27,7 @@ from bns.store.archive.kept import (
 from bns.store.disk.digest import is_intact, is_sealed
 from bns.store.disk.parquet import READ_FAULTS
 from bns.store.read.reader import finished
-from bns.store.read.views import pattern
+from bns.store.read.scan import pattern
 from bns.store.schema import METADATA_KEY, PARAMETERS
 
 ARCHIVED = "archived"

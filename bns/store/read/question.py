@@ -11,7 +11,7 @@ import duckdb
 import pyarrow as pa
 
 from bns.errors import StoreError
-from bns.store.read.views import pattern
+from bns.store.read.scan import pattern
 from bns.store.schema import SCHEMAS
 
 MOST_ROWS, MOST_BYTES = 5_000_000, 1 << 29

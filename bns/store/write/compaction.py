@@ -32,7 +32,7 @@ class CompactSummary:
             f"recovered from journals, {self.dropped_copies} copies dropped, "
             f"{self.upgraded_files} files upgraded"
         ]
-        lines += [f"could not be read, set aside: {path}" for path in self.set_aside]
+        lines += [f"not as it was written, set aside: {path}" for path in self.set_aside]
         lines += [f"skipped, being written: sweep {sweep}" for sweep in self.skipped_sweeps]
         return "\n".join(lines)
 

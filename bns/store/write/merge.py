@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import duckdb
 import pyarrow as pa
 
 from bns.store.disk.files import publish, remove, set_aside
@@ -14,6 +15,7 @@ from bns.store.disk.journal import journals
 from bns.store.disk.parquet import file_bytes, joined_hashes, read_part, renewed_metadata
 from bns.store.disk.parts import Part, check_version, find_parts
 from bns.store.disk.whole import exchanged, lacking, without
+from bns.store.read.counts import miscounts, suspects
 from bns.store.record import STATUSES
 from bns.store.schema import RECORDED, SCHEMA_VERSION, SCHEMAS, upgraded
 from bns.store.write.fold import clear_staging, fold_journal, publish_fold, staged
@@ -43,13 +45,16 @@ class _Fold:
     kept: frozenset[str]
     lost: tuple[str, ...]  # tables that the runs have rows in and that are not there
     whole: bool  # every run that counts here and is ok has all of its rows here
+    short: frozenset[str]  # runs that have lost rows here and of which there is no better copy
+    strays: frozenset[str]  # runs that have rows here, and none in "runs"
 
     @property
     def runs(self) -> Part:
         return self.parts["runs"]
 
     @property
-    def has_copies(self) -> bool:
+    def must_go(self) -> bool:
+        """Whether there are rows in it that do not count."""
         return len(self.kept) < self.runs.rows
 
     @property
@@ -64,12 +69,13 @@ def compact_sweep(root: Path, sweep: str, tally: Tally) -> None:
     tables = _readable(root, sweep, tally)
     for part in tables["specs"]:
         _upgrade_alone(root, part, tally)
-    folds = _folds(tables)
+    folds = _folds(root, tables)
     _clear_orphans(root, tables, folds, tally)
+    _keep_remains(root, folds, tally)
     for task in sorted({fold.runs.task for fold in folds}):
         for group in _groups([fold for fold in folds if fold.runs.task == task]):
             _rewrite(root, sweep, task, group)
-            tally.dropped += sum(fold.runs.rows - len(fold.kept) for fold in group)
+            tally.dropped += sum(fold.runs.rows - len(fold.kept) - len(fold.short) for fold in group)
             tally.upgraded += sum(fold.old_files for fold in group)
 
 
@@ -98,20 +104,25 @@ def _upgrade_alone(root: Path, part: Part, tally: Tally) -> None:
         tally.upgraded += 1
 
 
-def _folds(tables: dict[str, list[Part]]) -> list[_Fold]:
+def _folds(root: Path, tables: dict[str, list[Part]]) -> list[_Fold]:
     """The folds of a sweep by place, with what counts in each: best status first, then first place."""
     by_place = {name: {part.place: part for part in parts} for name, parts in tables.items()}
     gaps = lacking(tables)
+    rows = {place: _claimed(part) for place, part in by_place["runs"].items()}
+    asked = {place: sum(count for _, status, count in those if status == "ok") for place, those in rows.items()}
+    with duckdb.connect() as connection:
+        wrong = miscounts(connection, root, tables, suspects(tables, asked))
     best: dict[str, tuple[int, str]] = {}
-    for place, part in by_place["runs"].items():
-        rows = read_part(part.path, ["run_id", "status"])
-        for run, status in zip(rows["run_id"].to_pylist(), rows["status"].to_pylist(), strict=True):
-            claim = (_INCOMPLETE if status == "ok" and place in gaps else STATUSES.index(status), place)
+    for place, those in rows.items():
+        for run, status, _ in those:
+            lost = status == "ok" and (place in gaps or run in wrong.short.get(place, ()))
+            claim = (_INCOMPLETE if lost else STATUSES.index(status), place)
             best[run] = min(claim, best.get(run, claim))
     kept: dict[str, set[str]] = {place: set() for place in by_place["runs"]}
-    incomplete = {place for claim, place in best.values() if claim == _INCOMPLETE}
-    for run, (_, place) in best.items():
-        kept[place].add(run)
+    short: dict[str, set[str]] = {place: set() for place in by_place["runs"]}
+    incomplete = {place for rank, place in best.values() if rank == _INCOMPLETE and place in gaps}
+    for run, (rank, place) in best.items():
+        (short if rank == _INCOMPLETE and place not in gaps else kept)[place].add(run)
     names = ("runs", *RECORDED)
     return [
         _Fold(
@@ -120,9 +131,23 @@ def _folds(tables: dict[str, list[Part]]) -> list[_Fold]:
             frozenset(kept[place]),
             gaps.get(place, ()),
             place not in incomplete,
+            frozenset(short[place]),
+            wrong.strays.get(place, frozenset()),
         )
         for place in sorted(kept)
     ]
+
+
+def _claimed(part: Part) -> list[tuple[str, str, int]]:
+    columns = read_part(part.path, ["run_id", "status", "evaluations"]).to_pydict()
+    return list(zip(columns["run_id"], columns["status"], columns["evaluations"], strict=True))
+
+
+def _keep_remains(root: Path, folds: list[_Fold], tally: Tally) -> None:
+    """Copy the files with what is left of runs that have lost rows: new files leave it out, and the sweep does them again."""
+    known = {run for fold in folds for run in fold.kept}
+    for fold in (fold for fold in folds if fold.short or not fold.strays <= known):
+        tally.set_aside += [set_aside(root, part.path, part.path.read_bytes()) for part in fold.parts.values()]
 
 
 def _clear_orphans(root: Path, tables: dict[str, list[Part]], folds: list[_Fold], tally: Tally) -> None:
@@ -141,14 +166,14 @@ def _groups(folds: list[_Fold]) -> list[list[_Fold]]:
     alone = [[fold] for fold in folds if not fold.whole or not fold.kept]
     merged: list[list[_Fold]] = [[]]
     for fold in (fold for fold in folds if fold.whole and fold.kept):
-        if len(fold.kept) < FEWEST_RUNS or fold.has_copies or fold.old_files:
+        if len(fold.kept) < FEWEST_RUNS or fold.must_go or fold.old_files:
             if _size(merged[-1]) >= FEWEST_RUNS or _size([*merged[-1], fold]) > MOST_RUNS:
                 merged.append([])
             merged[-1].append(fold)
     if len(merged) > 1 and _size(merged[-2] + merged[-1]) <= MOST_RUNS:
         merged[-2:] = [merged[-2] + merged[-1]]
     return [
-        group for group in alone + merged if len(group) > 1 or any(fold.has_copies or fold.old_files for fold in group)
+        group for group in alone + merged if len(group) > 1 or any(fold.must_go or fold.old_files for fold in group)
     ]
 
 

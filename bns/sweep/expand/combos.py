@@ -36,6 +36,10 @@ class Parts:
     world_lines: dict[str, int] = field(default_factory=dict)
     keys: dict[str, Located] = field(default_factory=dict)
     """Parameter -> its key under fixed, grid, zip or sample."""
+    stored: bool = False
+    """Is it a text of the results? Older versions let a value under grid come twice."""
+    doubled: list[str] = field(default_factory=list)
+    """``parameter: value`` of each such value, whose combinations are merged."""
 
 
 def combinations(root: Located, parts: Parts) -> dict[RunSpec, dict[str, Any]]:

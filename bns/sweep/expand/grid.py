@@ -10,13 +10,14 @@ Keys: ``name``, ``robot`` (required); ``seeds`` (how many; default 1); ``first_s
 from __future__ import annotations
 
 import re
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from bns.errors import SpecError, unknown_name
+from bns.errors import SpecError, SweepWarning, unknown_name
 from bns.robots import load_robot
 from bns.spec import FIELDS, RunSpec, checked, unquoted
 from bns.sweep.expand.combos import Parts, check_size, combinations
@@ -101,11 +102,22 @@ def load_sweeps(paths: Iterable[str | Path]) -> list[Sweep]:
     return list(found.values())
 
 
+def parse_stored(text: str, sweep: str) -> Sweep:
+    """The sweep that a text of the results describes, ``sweep`` is its name there.
+
+    A value under grid that is there twice, as older versions let it be, is run once as it was then, with one SweepWarning.
+    """
+    return _parsed(text, Path(f"{sweep}.yaml"), Parts(stored=True))
+
+
 def parse_sweep(text: str, path: Path) -> Sweep:
     """The sweep that a file's text describes; ``path`` is for messages."""
+    return _parsed(text, path, Parts())
+
+
+def _parsed(text: str, path: Path, parts: Parts) -> Sweep:
     root = parse_yaml(text, path)
     places = _places(root)
-    parts = Parts()
     for name, (_key, value) in places.items():
         _READERS[name](parts, value)
     parts.keys = _check_once(places)
@@ -114,6 +126,13 @@ def parse_sweep(text: str, path: Path) -> Sweep:
     _check_default_task(root, parts, combos)
     check_size(parts.seeds * len(combos), places["seeds"][1] if "seeds" in places else root)
     _check_seeds(root, parts, places)
+    if parts.doubled:
+        warnings.warn(
+            f"the file of sweep {parts.name!r} that the results hold has values twice ({', '.join(parts.doubled)}), which an "
+            "older bns allowed: each counts once, as it was run.",
+            SweepWarning,
+            stacklevel=4,
+        )
     return Sweep(
         parts.name,
         parts.robot,
@@ -243,14 +262,17 @@ def _lists(parts: Parts, value: Located, what: str) -> dict[str, list[Any]]:
         elements = each.elements(f"{name} under {what}")
         lists[name] = [_checked(parts, name, key, element) for element in elements]
         if what == "grid":  # under zip a value may be taken with several of another parameter
-            _check_different(name, elements, lists[name])
+            _check_different(parts, name, elements, lists[name])
     return lists
 
 
-def _check_different(name: str, elements: list[Located], values: list[Any]) -> None:
+def _check_different(parts: Parts, name: str, elements: list[Located], values: list[Any]) -> None:
     """SpecError where a value is there twice: it would be run once, which is not what somebody meant."""
     for number, (element, value) in enumerate(zip(elements, values, strict=True)):
         if value in values[:number]:
+            if parts.stored:
+                parts.doubled.append(f"{name}: {value!r}")
+                continue
             first = elements[values.index(value)].line
             element.fail(
                 f"{name} has the value {value!r} twice (first on line {first}). Keep one of the two; runs are repeated by seeds."

@@ -13,6 +13,7 @@ from bns.spec import RunSpec
 from bns.store.provenance import provenance
 from bns.store.record import RunRecord
 from bns.sweep.jobs.executor import Job, without_result
+from bns.sweep.jobs.heard import listening
 from bns.sweep.jobs.job import describe
 from bns.sweep.jobs.workers import LEFT_TO_PARENT
 
@@ -35,7 +36,7 @@ def carry_out(job: Job, spec: RunSpec, run_id: str) -> RunRecord:
 def _whatever_happens(job: Job, spec: RunSpec) -> RunRecord:
     started_at, began = datetime.now(UTC), perf_counter()
     try:
-        return job(spec)
+        return listening(job, spec)
     except BaseException as fault:  # SystemExit too, which would end the worker
         return without_result(spec, "failed", describe(fault), started_at, perf_counter() - began)
 

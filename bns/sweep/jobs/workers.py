@@ -16,6 +16,7 @@ import time
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import partial
 from typing import Self
 
 from joblib.externals.loky import ProcessPoolExecutor
@@ -23,6 +24,7 @@ from joblib.externals.loky import ProcessPoolExecutor
 from bns.spec import RunSpec
 from bns.store.record import RunRecord
 from bns.sweep.jobs.executor import ATTEMPTS, Job, attempted, without_result
+from bns.sweep.jobs.heard import listening
 from bns.sweep.jobs.job import describe, run_job
 from bns.sweep.jobs.trackers import without_complaints
 
@@ -121,11 +123,12 @@ class LokyExecutor:
 
     def _begin(self, slot: _Slot, spec: RunSpec) -> None:
         slot.attempt += 1
+        job = partial(listening, self._job) if slot.attempt == 1 else self._job
         try:
-            slot.future = self._pool(slot).submit(self._job, spec)
+            slot.future = self._pool(slot).submit(job, spec)
         except BrokenExecutor:  # the worker died while it was idle: no run is to blame
             slot.pool = None
-            slot.future = self._pool(slot).submit(self._job, spec)
+            slot.future = self._pool(slot).submit(job, spec)
 
     def _pool(self, slot: _Slot) -> ProcessPoolExecutor:
         if slot.pool is None:
