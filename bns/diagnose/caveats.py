@@ -13,6 +13,7 @@ from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.data.variables import bare, label, velocity
 from bns.diagnose.estimate.cancelling import cancelled
 from bns.diagnose.estimate.plausibility import known_together, with_unit
+from bns.diagnose.estimate.single_wheel import single_wheel
 from bns.diagnose.estimate.smoothing_tracker import LATE, smoothing_tracker
 from bns.diagnose.outcome import Outcome
 from bns.diagnose.predict.horizons import IN_WORDS
@@ -292,10 +293,10 @@ def _on_effects(selection: SelectionResult, tracks: Tracks, imitating: Sequence[
     assuming = [*chain, *(known[name] for name in imitating if name in known)]
     yield from (effect.assumes for effect in assuming if effect.assumes)
     tracker = smoothing_tracker(selection.problem, selection.fit) if names.intersection(LATE) else None
-    if tracker is not None and tracker.in_words:
-        yield tracker.in_words
+    yield from [tracker.in_words] if tracker is not None and tracker.in_words else []
     yield from (text for effect in chain for other, text in effect.beside.items() if other in names)
-    yield from (_on_numbers(known[name]) for name in selection.accepted if known_together(selection.fit, name))
+    together = [name for name in selection.accepted if known_together(selection.fit, name)]
+    yield from (*single_wheel(selection.fit), *(_on_numbers(known[name]) for name in together))
     yield from _on_stamps(tracks, names)
     yield from _on_times(selection, tracks, names)
     per_trial_effect = selection.fit.model.per_trial_effect

@@ -283,7 +283,7 @@ def test_so_many_more_trials_as_would_make_a_sign_certain_are_asked_for(z, more)
     """The gain in standard errors grows with the root of the trials: from 2 to 3.2 it takes 2.56 times as many."""
     selection = SimpleNamespace(
         implausible={}, accepted=(), competing_models=(), steps=(SimpleNamespace(ranking=()),),
-        fit=SimpleNamespace(model=NOMINAL), nominal=SimpleNamespace(losses=np.ones(10)),
+        fit=SimpleNamespace(model=NOMINAL, free=()), nominal=SimpleNamespace(losses=np.ones(10)),
     )  # fmt: skip
     nothing = dict.fromkeys(("imitating", "withdrawn", "unseen", "negligible", "formula", "errors_with_terms"))
     nothing["beside_negligible"] = {}
@@ -298,7 +298,7 @@ def test_a_number_without_a_unit_is_written_without_one(monkeypatch):
     monkeypatch.setattr("bns.diagnose.caveats._on_moved", lambda _: ["What it moves."])
     selection = SimpleNamespace(
         implausible={}, accepted=(), competing_models=(), steps=(SimpleNamespace(ranking=()),),
-        fit=SimpleNamespace(model=NOMINAL), nominal=SimpleNamespace(losses=np.ones(10)),
+        fit=SimpleNamespace(model=NOMINAL, free=()), nominal=SimpleNamespace(losses=np.ones(10)),
     )  # fmt: skip
     numbers = {"x_m_s": {"value": 0.0026, "unit": "m/s"}, "behind_share": {"value": 0.00124, "unit": "1"}}
     nothing = {**dict.fromkeys(("withdrawn", "unseen", "formula", "errors_with_terms")), "beside_negligible": {}}
