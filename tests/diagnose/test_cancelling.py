@@ -10,6 +10,7 @@ from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.cancelling import Cancelled, cancelled
 from bns.diagnose.report.sized import sized_sentence
+from bns.diagnose.report.text import _number
 from bns.diagnose.residuals.grammar import RESPONSE
 from bns.diagnose.residuals.unexplained import NOTHING
 from bns.physics.effects import effect_named
@@ -150,4 +151,7 @@ def test_nor_does_it_give_a_lag_of_which_a_free_response_has_the_most(monkeypatc
     selection = SimpleNamespace(fit=fit_of((*LAG, 0.12, 0.11, 0.13)), accepted=("motor-lag",))
     for signal, cancels in ((RESPONSE, True), ("speed", False)):
         term = SimpleNamespace(fit=fit_of((*LAG, 0.02, 0.01, 0.03)), name="unlisted", signal=signal)
-        assert ("cancels" in Diagnosis("unlisted", selection, terms=(term,)).numbers["motor-lag"]["tau_s"]) is cancels
+        number = Diagnosis("unlisted", selection, terms=(term,)).numbers["motor-lag"]["tau_s"]
+        assert ("cancels" in number) is cancels
+        said = _number("tau_s", number | {"unit": "s", "low": 0.01, "high": 0.03})
+        assert said == f"tau_s = 0.02 s (95 %: 0.01 to 0.03{', together with the free term only: see the notes' * cancels})"
