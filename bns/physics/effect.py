@@ -133,6 +133,8 @@ class Effect:
     """The sentence with fitted numbers, a format string: ``{tau_s}`` is a number with its unit, ``{gain:faster|slower}`` how far
     it is from neutral and the word for above or below ("7 % slower"), ``{gain:faster|slower|}`` that word alone. A plus
     before the words, ``{left_m:+to its left|to its right}``, says the side even of a number that may be neutral."""
+    sized_by: Callable[[Mapping[str, float]], str] | None = field(default=None, repr=False)
+    """Instead of ``sized``, from all its numbers together; "" where the general sentence is to stand."""
     measurement: str = ""
     """A measurement on the bench that shows this effect alone."""
     or_of_robot: str = ""

@@ -67,6 +67,29 @@ def number(value, low=None, high=None, **more):
             *("breakaway", {"threshold_m_s": number(0.075), "stop_ratio": number(0.47)}),
             "a wheel at rest starts at 75 mm/s, and one that turns stops at 47 % of that",
         ),
+        (
+            "controller-overshoot",  # 1 Hz and a damping ratio of 0.35 in turns
+            {"tau_s": number(0.0792), "lead_s": number(0.0351), "swing_s": number(0.0523), "turn_ratio": number(9.7)},
+            "the wheels answer a command as a drive of the second order does, and swing before they settle: in turns with a "
+            "natural frequency of 0.98 Hz and a damping ratio of 0.35",
+        ),
+        (
+            "controller-overshoot",
+            {"tau_s": number(0.04), "lead_s": number(0.06), "swing_s": number(0.1), "turn_ratio": number(4.0)},
+            "the wheels answer a command as a drive of the second order does, and swing before they settle: on straight "
+            "lines with a natural frequency of 1.6 Hz and a damping ratio of 0.5, in turns with a natural frequency of 0.8 Hz and a "
+            "damping ratio of 0.25",
+        ),
+        (
+            "controller-overshoot",  # the mean of the last 0.3 s: no resonance
+            {"tau_s": number(0.15), "lead_s": number(0.0), "swing_s": number(0.0866), "turn_ratio": number(1.0)},
+            "the wheels answer a command in two stages",
+        ),
+        (
+            "controller-overshoot",
+            {"tau_s": number(0.0, cancels=True), "lead_s": number(0.0), "swing_s": number(0.0866), "turn_ratio": number(1.0)},
+            "the wheels answer a command in two stages",
+        ),
         ("command-timeout", {"timeout_s": number(0.7)}, "the robot stops 700 ms after its last new command"),
         (
             *("overload-trip", {"step_m_s": number(0.45), "off_s": number(0.2)}),

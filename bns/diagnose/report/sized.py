@@ -18,8 +18,13 @@ _BY_FACTOR = DEFAULTS.report.by_factor
 def sized_sentence(effect: Effect, numbers: Mapping[str, Mapping[str, Any]]) -> str:
     """The effect's `sized` with its numbers; its general sentence where there is none, or where the data leave a side open.
 
-    ``numbers``: those of the effect, by parameter, as `numbers_of` gives them.
+    ``numbers``: those of the effect, by parameter, as `numbers_of` gives them. Of `Effect.sized_by`: where all may be read alone.
     """
+    if effect.sized_by is not None:
+        each = [numbers.get(p.name, {}) for p in effect.parameters]
+        readable = all(n.get("value") is not None and not n.get("per_trial") and not n.get("cancels") for n in each)
+        values = {p.name: float(n["value"]) for p, n in zip(effect.parameters, each, strict=True)} if readable else {}
+        return (effect.sized_by(values) if values else "") or effect.in_words
     if not effect.sized:
         return effect.in_words
     known = {p.name: p for p in effect.parameters}

@@ -11,6 +11,7 @@ Without a swing and a lead it is `motor-lag`.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Wheels
@@ -24,6 +25,19 @@ def apply(wheels: Wheels, tau_s: float, lead_s: float, swing_s: float, turn_rati
     mean = second_order(mean, wheels.step_s, tau_s, lead_s, swing_s)
     half = second_order(half, wheels.step_s, tau_s, lead_s, swing_s * math.sqrt(turn_ratio))
     return wheels.turning(mean - half, mean + half)
+
+
+def sized_by(values: Mapping[str, float]) -> str:
+    """On a swing, that is a resonance (damping ratio below 1/sqrt(2)), of straight lines, turns, or both."""
+    said, on_lines_s = [], values["swing_s"]
+    for where, swing_s in (("on straight lines", on_lines_s), ("in turns", on_lines_s * math.sqrt(values["turn_ratio"]))):
+        damping = (values["tau_s"] + values["lead_s"]) / (2.0 * swing_s) if swing_s > 0.0 else math.inf
+        if damping < math.sqrt(0.5):
+            hertz = 1.0 / (2.0 * math.pi * swing_s)
+            said.append(f"{where} with a natural frequency of {hertz:.2g} Hz and a damping ratio of {damping:.2g}")
+    if not said:
+        return ""
+    return f"the wheels answer a command as a drive of the second order does, and swing before they settle: {', '.join(said)}"
 
 
 EFFECT = Effect(
@@ -47,6 +61,7 @@ EFFECT = Effect(
     "made up for.",
     lookalikes=("motor-lag", "clock-offset", "command-delay"),
     sentence="the wheels answer a command in two stages, as a drive of the second order does, and may swing before they settle",
+    sized_by=sized_by,
     measurement="log the wheels' own speeds (encoders) at a high rate while a command changes, ahead and on the spot",
     explained_by=("wheel_left_m_s", "wheel_right_m_s"),
     caveat="controller-overshoot: a marker on a mast that swings answers in the same way, and without a swing firmware that "
