@@ -77,8 +77,8 @@ def number(value, low=None, high=None, **more):
             "controller-overshoot",
             {"tau_s": number(0.04), "lead_s": number(0.06), "swing_s": number(0.1), "turn_ratio": number(4.0)},
             "the wheels answer a command as a drive of the second order does, and swing before they settle: on straight "
-            "lines with a natural frequency of 1.6 Hz and a damping ratio of 0.5, in turns with a natural frequency of 0.8 Hz and "
-            "a damping ratio of 0.25",
+            "lines with a natural frequency of 1.6 Hz and a damping ratio of 0.5, in turns with a natural frequency of 0.8 Hz "
+            "and a damping ratio of 0.25",
         ),
         (
             "controller-overshoot",  # the mean of the last 0.3 s: no resonance
