@@ -81,6 +81,24 @@ def test_fits_of_sets_of_effects_search_for_thresholds(dead_band):
     assert fit_set(problem.predictor, NOMINAL, [effect], known=fit.model)[1].spans
 
 
+def test_a_slope_that_spans_a_step_does_not_narrow_the_interval():
+    """The other number would follow the step's slope, off to where the loss is higher within the same two changes of command."""
+    true = hidden(supply_trip={"step_m_s": 0.2, "off_s": 0.3})
+    predictor = predictor_of(true, trials=20, seed=6, speeds=(-0.2, 0.2), jitter=0.0)
+    told = predictor.grid.left_m_s, predictor.grid.right_m_s
+    sizes = sum(np.abs(np.diff(wheel, axis=1, prepend=0.0)) for wheel in told)
+    below, above = sizes[sizes < 0.2].max(), sizes[sizes > 0.2].min()
+    effect = listed(NOMINAL, None, predictor.tracks)["supply-trip"]
+    limit, off = effect.parameters
+    effect = replace(effect, parameters=(replace(limit, resolution=0.02), off))  # over which the slope is taken
+    model = NOMINAL.with_active(effect, ((below + above) / 2, 0.3))
+    problem = problem_for(predictor, model)
+    fit = problem.fit(model)
+    assert np.abs(fit.jacobian[..., 0]).max() > 0
+    low, high = with_jagged(problem, fit).interval(0)
+    assert low < below < above < high
+
+
 @pytest.fixture(scope="module")
 def gain():
     """A smooth number that says that it is jagged: problem and fit."""

@@ -75,14 +75,14 @@ def _followed(problem: Problem, fit: Fit, j: int) -> Array:
 
 def _searched(problem: Problem, fit: Fit, j: int) -> tuple[float, tuple[float, float]]:
     """The best value of a number along its profile, and its 95 % interval."""
-    p, way = fit.free[j].parameter, _followed(problem, fit, j)
+    p = fit.free[j].parameter
+    ways = _followed(problem, fit, j), np.eye(len(fit.free))[j]  # a slope that spans a step leads the others astray
     middle = float(fit.values[j])
     reach = 3.0 * max(fit.se(j), abs(increment(fit.free[j], middle)) / 10.0)
     value, low, high = middle, middle, middle
     for _ in range(_ROUNDS):
         at = np.clip(np.linspace(middle - reach, middle + reach, _POINTS), p.low, p.high)
-        models = (moved_by(fit.model, fit.free, (v - fit.values[j]) * way) for v in at)
-        losses = np.stack([problem.per_trial(huber(problem.whitened(model))) for model in models])
+        losses = np.stack([_lowest(problem, fit, [(v - fit.values[j]) * way for way in ways]) for v in at])
         value, low, high = _middle_of_least(at, losses.sum(axis=1)), *_drawn(at, losses)
         farthest = max(high - middle, middle - low)
         if farthest > _EDGE * reach:
@@ -93,6 +93,12 @@ def _searched(problem: Problem, fit: Fit, j: int) -> tuple[float, tuple[float, f
             break
         middle = value
     return value, (low, high)
+
+
+def _lowest(problem: Problem, fit: Fit, steps: list[Array]) -> Array:
+    """Losses (trials,) after that of these steps (p,) which leads to the least in all."""
+    models = (moved_by(fit.model, fit.free, step) for step in steps)
+    return min((problem.per_trial(huber(problem.whitened(model))) for model in models), key=lambda losses: float(losses.sum()))
 
 
 def _middle_of_least(at: Array, losses: Array) -> float:
