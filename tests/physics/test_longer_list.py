@@ -7,6 +7,7 @@ import pytest
 
 from bns.physics.effect import REFERENCE_WHEELBASE_M
 from bns.physics.effects import all_effects, effect_named
+from bns.physics.effects.overload_trip import changes_and_missing, starts_of
 from bns.physics.effects.wheel_eccentricity import starts_from
 from bns.physics.model import Model
 from bns.physics.signals import Body, Conditions, Wheels
@@ -354,6 +355,26 @@ def test_a_limit_and_a_time_are_guessed_from_what_was_seen_or_not_at_all(name, l
     assert 1 < len(starts) <= 4
     assert guess(Wheels(step, *told, B)) == ()
     assert guess(Wheels(step, *np.zeros_like(told), B, Conditions(seen=seen))) == ()
+
+
+def test_no_limit_lies_between_equal_changes_and_none_where_nothing_is_missing():
+    sizes, speed = np.array([0.3, 0.1, 0.3, 0.1]), np.ones(4)
+    limits = [start[0] for start in starts_of(sizes, speed, np.array([0.2, 0.0, 0.0, 0.0]))]
+    assert sorted(limits) == pytest.approx([0.05, 0.2])
+    assert starts_of(sizes, speed, np.full(4, -0.1)) == ()
+
+
+@pytest.mark.parametrize(("stood_from", "missing_m"), [(3, 0.1), (15, 0.0)])
+def test_what_is_missing_later_than_a_second_after_a_change_has_another_cause(stood_from, missing_m):
+    """One command of 4 s in steps of 0.1 s; both wheels stood for half a second."""
+    step, told = np.full((1, 40), 0.1), np.full((1, 40), 0.2)
+    drove = told.copy()
+    drove[0, stood_from : stood_from + 5] = 0.0
+    at = np.cumsum(drove * step, axis=1) - drove * step / 2
+    seen = np.stack([at, np.zeros_like(at), np.zeros_like(at)], axis=2)
+    by, speed, missing = changes_and_missing(Wheels(step, told, told, B, Conditions(seen=seen)))
+    assert by.tolist() == speed.tolist() == [[0.2], [0.2]]
+    assert missing == pytest.approx(np.full((2, 1), missing_m), abs=1e-9)
 
 
 def test_a_carpet_carries_the_robot_by_a_share_of_the_distance():
