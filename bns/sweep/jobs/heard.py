@@ -48,7 +48,7 @@ def listening(job: Callable[[RunSpec], RunRecord], spec: RunSpec) -> RunRecord:
         raise
     finally:
         _hearing.texts = None
-    return replace(record, heard=(*record.heard, *texts))
+    return replace(record, heard=(*record.heard, *texts)) if texts else record
 
 
 def _listen() -> None:
