@@ -78,7 +78,7 @@ def timed_out(left: Array, right: Array, step_s: Array, timeout_s: float) -> tup
 def tripped(left: Array, right: Array, step_s: Array, limit: float, off_s: float, together: bool) -> tuple[Array, Array]:
     """Mean over each step of two speeds that are 0 for ``off_s`` after a change beyond a limit, in size; exact.
 
-    Of each by itself, or of both ``together`` after changes that exceed it when added up. Each such change starts the time anew.
+    Of each by itself, or of both ``together`` after changes that exceed it when added up. Each such change restarts the timer.
     """
     mean_left, mean_right = np.zeros_like(left), np.zeros_like(right)
     for row in range(left.shape[0]):
