@@ -81,6 +81,13 @@ def test_fits_of_sets_of_effects_search_for_thresholds(dead_band):
     assert fit_set(problem.predictor, NOMINAL, [effect], known=fit.model)[1].spans
 
 
+def test_a_limit_that_nothing_reaches_has_come_no_way():
+    """Infinity less infinity is no number, and said so."""
+    problem = problem_for(predictor_of(NOMINAL, trials=3), NOMINAL)
+    added = problem.fit(NOMINAL.with_effect("command-timeout", timeout_s=float("inf")))
+    assert not problem._chords(added, [0]).any()
+
+
 def test_a_slope_that_spans_a_step_does_not_narrow_the_interval():
     """The other number would follow the step's slope, off to where the loss is higher within the same two changes of command."""
     true = hidden(supply_trip={"step_m_s": 0.2, "off_s": 0.3})

@@ -306,7 +306,8 @@ class Problem:
         out = []
         for j in new:
             number = added.free[j]
-            changed = added.values[j] - number.parameter.neutral
+            neutral = number.parameter.neutral
+            changed = 0.0 if added.values[j] == neutral else added.values[j] - neutral  # a limit may be infinite still
             if not np.isfinite(changed):
                 changed, lacking = 1.0, self.whitened(added.model.without(number.effect))
             elif abs(changed) < abs(increment(number, added.values[j])):

@@ -95,9 +95,10 @@ def _miscounted(connection: duckdb.DuckDBPyConnection, found: Snapshot) -> Misco
         rows = [(place, run) for place, those in runs.items() for run in those]
         sweeps = [place.split("/")[0].removeprefix("sweep=") for place, _ in rows]
         columns = {"sweep": sweeps, "run_id": [run for _, run in rows], "place": [place for place, _ in rows]}
-        connection.register("arriving", pa.table(columns, schema=_WHERE_FROM))
-        connection.execute(f"CREATE TABLE store.{table} AS SELECT * FROM arriving")
-        connection.unregister("arriving")
+        if rows:
+            _copy(connection, table, pa.table(columns, schema=_WHERE_FROM))
+        else:  # DuckDB loads pandas for a table of Arrow's, which takes longer than all the rest
+            connection.execute(f"CREATE TABLE store.{table} (sweep VARCHAR, run_id VARCHAR, place VARCHAR)")
     if wrong.short:
         connection.execute(f"""UPDATE store.claims SET claim = {len(STATUSES)}
             WHERE NOT journal AND (run_id, place) IN (SELECT (run_id, place) FROM store.short)""")
