@@ -101,7 +101,7 @@ def test_numbers_that_may_be_anything_are_not_determined():
     assert not limiting(made_up(((-0.3, -0.1), (90.0, 600.0))), "warm-up")
     assert not limiting(made_up(((-0.3, -0.1), (2.0, 9.0))), "warm-up")
     assert limiting(made_up(((-0.3, -0.1), (600.0, 600.0))), "warm-up")  # as long as a trial, and would be longer
-    assert not limiting(made_up(((-1.0, -1.0), (90.0, 500.0))), "warm-up")  # the loss has an end that no log sets
+    assert not limiting(made_up(((1.0, 1.0), (90.0, 500.0))), "warm-up")  # the loss has an end that no log sets
 
 
 def test_a_warm_up_takes_no_longer_than_the_longest_trial():
