@@ -84,6 +84,7 @@ def notes_on(
         )
     yield from _on_moved(found)
     yield from _on_effects(selection, tracks, found.imitating)
+    yield from single_wheel(found.terms[0].fit if _described(found) else selection.fit)  # the numbers that are shown
     yield from _on_the_cone(selection.fit.model)
     for names in longer:
         yield _on_longer(selection, names)
@@ -120,11 +121,15 @@ def _on_terms(found: Outcome, terms: Sequence[str], tracks: Tracks) -> Iterator[
         yield _on_reach(tracks)
 
 
+def _described(found: Outcome) -> bool:
+    """Are there terms, and may they be added?"""
+    return bool(found.terms) and (found.errors_with_terms is None or found.errors_with_terms.falls_in_the_end)
+
+
 def _on_undescribed(found: Outcome) -> Iterator[str]:
     """On effects beside something that no term describes: nothing tells how much of it they stand for."""
-    with_terms, names = found.errors_with_terms, found.selection.accepted
-    described = bool(found.terms) and (with_terms is None or with_terms.falls_in_the_end)
-    if described or not names or not found.rest.any:
+    names = found.selection.accepted
+    if _described(found) or not names or not found.rest.any:
         return
     known = {h: one for h, one in found.errors.horizons.items() if one.models and one.noise_floor_m > 0}
     at = max(known, key=lambda h: known[h].models[-1].rms_m / known[h].noise_floor_m, default="")
@@ -295,8 +300,7 @@ def _on_effects(selection: SelectionResult, tracks: Tracks, imitating: Sequence[
     tracker = smoothing_tracker(selection.problem, selection.fit) if names.intersection(LATE) else None
     yield from [tracker.in_words] if tracker is not None and tracker.in_words else []
     yield from (text for effect in chain for other, text in effect.beside.items() if other in names)
-    together = [name for name in selection.accepted if known_together(selection.fit, name)]
-    yield from (*single_wheel(selection.fit), *(_on_numbers(known[name]) for name in together))
+    yield from (_on_numbers(known[name]) for name in selection.accepted if known_together(selection.fit, name))
     yield from _on_stamps(tracks, names)
     yield from _on_times(selection, tracks, names)
     per_trial_effect = selection.fit.model.per_trial_effect

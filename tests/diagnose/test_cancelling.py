@@ -111,6 +111,7 @@ def test_the_note_has_both_numbers():
 )
 def test_it_is_among_the_notes_where_the_term_is_in_the_extended_model(monkeypatch, rose, signal, beside, said):
     monkeypatch.setattr("bns.diagnose.caveats._on_undescribed", lambda found: ["on what is left"])
+    monkeypatch.setattr("bns.diagnose.caveats.single_wheel", lambda fit: [f"one wheel by {fit.values[0]}"])
     selection = SimpleNamespace(
         implausible={}, accepted=("battery-sag",), competing_models=(), steps=(SimpleNamespace(ranking=()),),
         fit=fit_of((*SAG, 1e-4, 0.8e-4, 1.2e-4)), nominal=SimpleNamespace(losses=np.ones(10)),
@@ -123,6 +124,7 @@ def test_it_is_among_the_notes_where_the_term_is_in_the_extended_model(monkeypat
     )  # fmt: skip
     every = list(notes_on(found, tracks_of(measured(NOMINAL, trials=10)), None))
     assert "on what is left" in every
+    assert f"one wheel by {1e-4 if rose else beside}" in every  # by the numbers that are shown
     notes = [note for note in every if "the free term" in note]
     assert [note.startswith(said) for note in notes] == ([True] if said else [])
 
