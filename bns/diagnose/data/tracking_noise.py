@@ -3,12 +3,13 @@
 Poses of a robot that rests, after commands of zero, scatter by the tracker's noise alone, slow wander of the picture
 included; those in which it still coasts are left out (`rests`). A robot that creeps instead, down a slope for example, leaves a
 line, about which they scatter. While it drives under one command, a parabola through a few frames follows it and the rest is
-noise, white noise at least: slow noise follows the parabola, so this is a lower bound where the robot never rests.
+noise, white noise at least: slow noise follows the parabola, so this is a lower bound where the robot never rests. Where few
+poses at rest scatter as those while it drives, within what so few can tell, the many are taken: they are known better.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -23,13 +24,18 @@ DRIFTS = DEFAULTS.data.drift_at_rest
 WIDTH = DEFAULTS.data.parabola_frames
 ORDER = DEFAULTS.data.parabola_order
 SLOWEST_HZ = DEFAULTS.data.parabola_slowest_hz
-_DRIVING = "high frequency"
+AGREES = DEFAULTS.data.rest_agrees
+_AT_REST, _DRIVING, _BOTH = "at rest", "high frequency", "at rest, high frequency"
+_SE = 1.166
+"""Standard error of a standard deviation that is taken from the median, relative, times the root of so many normal numbers."""
 
 
 @dataclass(frozen=True)
 class TrackingNoise:
-    """Standard deviation of one tracked pose: each of x and y (m), and the heading (rad). ``basis``: at rest, high frequency,
-    distances between tracked points."""
+    """Standard deviation of one tracked pose: each of x and y (m), and the heading (rad).
+
+    ``basis``: at rest; high frequency; both, where they agree; or distances between tracked points.
+    """
 
     position_m: float
     heading_rad: float
@@ -53,11 +59,22 @@ def tracking_noise(tracks: Tracks) -> TrackingNoise | None:
     """The noise of these tracks; None where they cannot tell (poses at the ends of commands alone, say)."""
     if not (tracks.left_m_s.any() or tracks.right_m_s.any()):
         return None  # no wheels, or a robot that was never told to move
-    rests = settled(list(told_to_stand(tracks)))
-    if sum(len(rest.t_s) for rest in rests) >= FEWEST_AT_REST:
-        still, creeping = (_pooled([_about(rest.t_s, rest.pose, order) for rest in rests], "at rest") for order in (0, 1))
-        return creeping if creeping.position_m < DRIFTS * still.position_m else still
-    return _high_frequency(tracks)
+    rests, driving = settled(list(told_to_stand(tracks))), _high_frequency(tracks)
+    poses = sum(len(rest.t_s) for rest in rests)
+    if poses < FEWEST_AT_REST:
+        return driving
+    still, creeping = (_pooled([_about(rest.t_s, rest.pose, order) for rest in rests], _AT_REST) for order in (0, 1))
+    resting = creeping if creeping.position_m < DRIFTS * still.position_m else still
+    alike = driving is not None and _agree(resting, driving, poses - len(rests))
+    return replace(driving, basis=_BOTH) if driving is not None and alike else resting
+
+
+def _agree(resting: TrackingNoise, driving: TrackingNoise, freedom: int) -> bool:
+    """Whether so many independent poses at rest, of two positions and a heading each, may scatter as those while it drives."""
+    pairs = (resting.position_m, driving.position_m, 2), (resting.heading_rad, driving.heading_rad, 1)
+    return all(
+        min(a, b) > 0 and abs(np.log(a / b)) < AGREES * _SE / np.sqrt(channels * freedom) for a, b, channels in pairs
+    )
 
 
 def _about(t_s: Array, pose: Array, order: int) -> Array:
@@ -75,8 +92,6 @@ def _pooled(parts: list[Array], basis: str) -> TrackingNoise:
 
 def _high_frequency(tracks: Tracks) -> TrackingNoise | None:
     """From what is left of a parabola through `WIDTH` frames of one command."""
-    projection = _residual_maker(WIDTH, ORDER)
-    middle, spare = projection[WIDTH // 2], float(np.sqrt(projection[WIDTH // 2, WIDTH // 2]))
     parts = []
     for trial, (a, b) in enumerate(pairwise(tracks.first)):
         t_s = tracks.t_s[a:b]
@@ -85,17 +100,32 @@ def _high_frequency(tracks: Tracks) -> TrackingNoise | None:
         command = np.searchsorted(np.cumsum(tracks.duration_s[trial]), t_s - 1e-9)
         values = np.column_stack([tracks.pose[a:b, :2], np.unwrap(tracks.pose[a:b, 2])])
         held = np.append(False, (np.diff(values, axis=0) == 0).all(axis=1))
-        windows = np.lib.stride_tricks.sliding_window_view(values, WIDTH, axis=0)
         one = command[WIDTH - 1 :] == command[: len(command) - WIDTH + 1]
-        repeats = np.convolve(held, np.ones(WIDTH), "valid") > 0
-        parts.append((windows @ middle)[one & ~repeats] / spare)
+        chosen = one & ~(np.convolve(held, np.ones(WIDTH), "valid") > 0)
+        view = np.lib.stride_tricks.sliding_window_view
+        makers = _residual_makers(view(t_s, WIDTH)[chosen], ORDER)
+        left = np.einsum("wck,wk->wc", view(values, WIDTH, axis=0)[chosen], makers)
+        parts.append(left / np.sqrt(makers[:, WIDTH // 2])[:, None])
     if sum(map(len, parts)) < FEWEST_AT_REST:
         return None
     return _pooled(parts, _DRIVING)
 
 
-def _residual_maker(width: int, order: int) -> Array:
-    """What is left of values at equal distances after the best polynomial, (width, width)."""
-    powers = np.vander(np.linspace(-1, 1, width), order + 1)
-    out: Array = np.eye(width) - powers @ np.linalg.pinv(powers)
+def _residual_makers(t_s: Array, order: int) -> Array:
+    """What is left of the middle one of values at times (windows, width) after the best polynomial: its weights, alike.
+
+    By polynomials that are orthogonal at these times, for frames come at uneven times, too.
+    """
+    middle = t_s.shape[1] // 2
+    times = t_s - t_s.mean(axis=1, keepdims=True)
+    out = np.zeros_like(times)
+    out[:, middle] = 1.0
+    found: list[Array] = []
+    for _ in range(order + 1):
+        one = times * found[-1] if found else np.ones_like(times)
+        for other in found:
+            one = one - (one * other).sum(axis=1, keepdims=True) * other
+        one = one / np.linalg.norm(one, axis=1, keepdims=True)
+        found.append(one)
+        out -= one[:, middle, None] * one
     return out

@@ -37,6 +37,11 @@ UNKNOWN_NOISE = (
     f"it takes poses at rest, or {DEFAULTS.data.parabola_frames} poses of one command in a row at "
     f"{DEFAULTS.data.parabola_slowest_hz:g} Hz or more"
 )
+_OF_NOISE = {
+    "at rest": "poses at rest",
+    "high frequency": "poses at high frequency",
+    "at rest, high frequency": "poses at high frequency; those at rest scatter alike",
+}
 _SHOWN = DEFAULTS.report.rows
 _WIDTH = DEFAULTS.report.formula_width
 _EXTENDED = "EXTENDED.yaml"
@@ -234,7 +239,7 @@ def error_lines(errors: PairedErrors, before_added: str = "") -> Iterator[str]:
         yield f"  (noise not known: {_why_unknown(errors.horizons)})"
     else:
         pose_mm, basis = 1e3 * errors.noise.position_m, errors.noise.basis
-        of = {"at rest": "poses at rest", "high frequency": "poses at high frequency"}.get(basis, basis)
+        of = _OF_NOISE.get(basis, basis)
         least = "at least " if errors.noise.is_lower_bound else ""
         yield f"  (noise: error that the tracking alone causes; {least}{pose_mm:.2f} mm per pose, estimated from {of})"
 

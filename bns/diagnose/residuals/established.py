@@ -121,7 +121,7 @@ def established(
     state = _pruned(predictor, state, level)
     state = _without_needless_terms(predictor, state, accepted, level)
     state = _pruned(predictor, state, level, _alone(predictor, given, state))
-    state = _without_shifts(predictor, _restored(predictor, state, accepted, level))
+    state = _without_shifts(predictor, given, _restored(predictor, state, accepted, level))
     state = _without_idle_terms(predictor, state, level)
     terms = tuple(replace(term, fit=state.fit) for term in state.terms)
     return Established(state.names, terms, state.problem, state.fit)
@@ -307,11 +307,19 @@ def _leaves_something(problem: Problem, fit: Fit) -> bool:
     return unexplained(problem, fit, residual_dependence(problem, fit)).any
 
 
-def _without_shifts(predictor: Predictor, state: _State) -> _State:
-    """Without the effects that a free response in time contains, however well they do beside its coarse steps."""
-    if any(term.signal == RESPONSE for term in state.terms):
-        for name in [shift for shift in SHIFTS if shift in state.names]:
-            state = state.without(predictor, name, fit_without(state.problem, state.fit, name))
+def _without_shifts(predictor: Predictor, given: Model, state: _State) -> _State:
+    """Without the effects that a free response in time contains, however well they do beside its coarse steps.
+
+    Beside any other free answer to past commands, without those that earn nothing in a model without terms, the least first: a
+    late command and a clock that is early by as much make up for its steps together.
+    """
+    contained = any(term.signal == RESPONSE for term in state.terms)
+    while any(term.signal in PAST for term in state.terms) and not {*SHIFTS}.isdisjoint(state.names):
+        worth = {name: gain for name, gain in _alone(predictor, given, state).items() if name in SHIFTS}
+        least = min(worth, key=lambda name: worth[name])
+        if not contained and worth[least] > MIN_GAIN * float(state.fit.held_out.mean()):
+            break
+        state = state.without(predictor, least, fit_without(state.problem, state.fit, least))
     return state
 
 
