@@ -16,10 +16,12 @@ from bns.approaches.parts.ensemble import USES, Ensemble, WorstSimulator
 from bns.approaches.parts.hybrid import MODELS, NO_MODEL, Arcs, HybridSimulator, arcs_of
 from bns.approaches.parts.informed import SNAPSHOTS, most_informative
 from bns.approaches.parts.neuro_simulation import NeuroSimulation
-from bns.approaches.parts.noisy import NoisySimulator, check_noise, most_certain, residual_sd
+from bns.approaches.parts.noisy import NoisySimulator, check_missed, check_noise, most_certain, residual_sd
+from bns.approaches.parts.shortening import shorten
 from bns.approaches.parts.surprise import IN_A_ROW, Surprise
 from bns.bootstrap.simulators import NetworkSimulator, Simulator
 from bns.bootstrap.trainer import Learner, Trainer
+from bns.engine.evolution import Population
 from bns.errors import SpecError
 from bns.tasks import Task
 
@@ -45,6 +47,11 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
     to random ones; the networks stay. A population that converged on poor networks hardly gets away from there: on the way to a
     goal that is missing, each further command costs fitness until it is reached. Its successor starts on networks that know more.
 
+    ``missed``: under noise, each goal missed costs so many metres more than the robot's own penalty, and a failure as much once
+    more. By distances alone a single command that can be saved outweighs some success; now the surer path is the fitter one.
+
+    ``shorten``: so large a share of all children loses commands (`bns.approaches.parts.shortening`).
+
     ``ensemble``: so many networks for each displacement (`bns.approaches.parts.ensemble`). ``use``: evolution works on
     their mean, on the one that thinks worst of a controller, or on one of them, drawn for each round.
 
@@ -62,6 +69,8 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
         "margin": Option(0.0, 0.0, 1.0, "m by which goals become narrower in evolution, all around"),
         "noise": Option(0, 0, 1000, "simulations of each controller under noise; 0: one without"),
         "renew": Option(0, 0, 1000, "rounds without a controller that reaches all goals until a new population; 0: never"),
+        "missed": Option(0.0, 0.0, 1000.0, "m that each goal missed under noise, and failing, costs beyond the robot's penalty"),
+        "shorten": Option(0.0, 0.0, 1.0, "fraction of each generation's children that lose commands"),
         "ensemble": Option(1, 1, 100, "networks for each displacement"),
         "use": Choice("mean", USES, "what evolution works on where networks are several"),
         "informed": Option(0.0, 0.0, 1.0, "fraction of the population, fittest first, of which the most informative is driven"),
@@ -80,8 +89,11 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
             self._check_margin(setting)
         if setting.options["noise"]:
             check_noise(setting)
+        check_missed(setting)
         self._chosen: tuple[int, np.ndarray] | None = None
         super().__init__(setting, trainer)
+        if setting.options["shorten"]:
+            self.evolver.after_breeding = self._shorten
 
     @classmethod
     def start(cls, setting: Setting) -> Self:
@@ -163,6 +175,10 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
             self._chosen = step, evolver.population.controller(found)
         return self._chosen[1].copy()
 
+    def _shorten(self, children: Population, generation: int) -> None:
+        setting = self.setting
+        shorten(children, setting.number("shorten"), setting.spec.min_commands, setting.own_key("shortening"), generation)
+
     def _renew(self) -> None:
         """Random controllers in the places of all; the evolution that follows scores them."""
         spec, key = self.setting.spec, self.setting.own_key(f"renewal {self._rounds}")
@@ -175,7 +191,8 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
         networks = NetworkSimulator(self.setting.robot, self.goals(), weights)
         if rows := self.setting.whole("noise"):
             sd = residual_sd(self.setting.robot, weights, self.trainer.data.validation)
-            return NoisySimulator(networks, sd * self._narrowed / STEPS, rows)
+            sd_now, missed_m = sd * self._narrowed / STEPS, self.setting.number("missed")
+            return NoisySimulator(networks, sd_now, rows, missed_m=missed_m)
         return networks if self._arcs is None else HybridSimulator(self._arcs.robot, self.goals(), self._arcs, networks)
 
     def goals(self) -> Task:

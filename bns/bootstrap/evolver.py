@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Self
 
@@ -39,6 +40,8 @@ class Evolver:
     bound_hits: int = 0
     failures: int = 0
     history: list[Generation] = field(default_factory=list)
+    after_breeding: Callable[[Population, int], None] | None = None
+    """What else changes children, in place, before they are scored; their generation is told. The first one is the elite."""
 
     @classmethod
     def start(cls, robot: Robot, task: Task, key: Key, spec: RunSpec, simulator: Simulator) -> Self:
@@ -81,6 +84,8 @@ class Evolver:
                 self._spare,
             )
             self.population, self._spare = self._spare, self.population
+            if self.after_breeding:
+                self.after_breeding(self.population, self.generations)
             self._score(simulator, self.scores)
             if self.spec.record == "full":
                 self.history.append(Generation(self.generations, self.fittest(), self.best_fitness, self.mean_fitness))

@@ -205,8 +205,8 @@ def _causes(both: WithoutWorst) -> str:
         said += (
             "The model lacks something, so a trial that differs throughout may be one in which this matters most. "
             if both.without[0] == "unlisted"
-            else "A trial that differs throughout had another load, floor or start, or its commands are logged at wrong times: "
-            "repeat it with the same commands. "
+            else "A trial that differs throughout had another load, floor or start, or its commands are logged at wrong times or "
+            "ask for what the model has least right: repeat it with the same commands. If it is off again, these tell why. "
         )
     return said
 
@@ -381,11 +381,7 @@ def _on_rest(rest: Unexplained, tracks: Tracks) -> Iterator[str]:
             f"variable removes: {along}; p {'<' if chance < 1e-4 else '<='} {max(chance, 1e-4):.2g}."
         )
     if rest.command_times is not None:
-        yield (
-            "No model predicts when a single command takes effect. A lag, a late command or a late clock that is named beside "
-            "this may be the mean of such delays. Log when the robot carries out each command, or let its controller "
-            "acknowledge them."
-        )
+        yield rest.command_times.note
     if rest.autocorrelation is not None:
         yield rest.autocorrelation.in_words
     if rest.outliers:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -22,12 +22,13 @@ from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.paired_errors import PairedErrors, noise_json, plain
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.along_variables import ResidualDependence
+from bns.diagnose.residuals.drive_scatter import scatter_in_words
 from bns.diagnose.residuals.established import curve_does_better
 from bns.diagnose.residuals.grammar import PAST
 from bns.diagnose.residuals.outliers import one_wheel
 from bns.diagnose.residuals.symbolic import Formula
+from bns.diagnose.residuals.together import formula_in_words, said_of
 from bns.diagnose.residuals.unexplained import NOTHING, Unexplained
-from bns.diagnose.residuals.words import in_words
 from bns.diagnose.residuals.worst_trials import WithoutWorst, apart, far_off, most_left_out, standing_out
 from bns.diagnose.select.equivalents import TRIED, equivalent_pairs
 from bns.diagnose.select.result import Candidate, SelectionResult
@@ -56,6 +57,9 @@ class Diagnosis:
     terms: tuple[Formula, ...] = ()
     """What no effect explains, as terms that can be added one after the other; their fit has the effects and all of them."""
     terms_in_words: tuple[str, ...] = ()
+    """One text a term, to stand beside its formula."""
+    terms_said: tuple[str, ...] = ()
+    """What the terms do (`said_of`): of those that cancel one another, only their sum is said; if empty, as `terms_in_words`."""
     formula_in_words: str = ""
     """Of the formula, where there are no terms."""
     negligible: Mapping[str, dict[str, dict[str, Any]]] = field(default_factory=dict)
@@ -118,11 +122,12 @@ class Diagnosis:
             "tracking_noise": noise_json(self.errors) if self.errors else None,
             "formula": self._formula(),
             "terms": self._terms(),
+            "behaviour": list(self.behaviour),
             "error_with_terms": before_and_after(self.errors_with_terms) if self.errors_with_terms else {},
             "residual_dependence": [dependence_values(p) for p in self.residual_dependence],
             "without_worst": self._without_worst(),
             "outliers": [vars(o) for o in self.rest.outliers],
-            "command_times": vars(self.rest.command_times) if self.rest.command_times else None,
+            "command_times": asdict(self.rest.command_times) if self.rest.command_times else None,
             "outliers_share": {**vars(self.rest.shared), "in_words": self.rest.shared.in_words} if self.rest.shared else None,
             "notes": list(self.notes),
             "calibration": numbers_of(self.calibration) if self.calibration else {},
@@ -135,13 +140,13 @@ class Diagnosis:
     @property
     def behaviour(self) -> tuple[str, ...]:
         """What no effect explains, in clauses: the variable it follows most where no term stands, `moments`, terms that stand."""
-        terms = () if self.terms_rejected else self.terms_in_words
+        terms = () if self.terms_rejected else self.terms_said or self.terms_in_words
         most = self.rest.residual_dependence[:1] if not terms else ()
         return *(p.in_words for p in most), *self.moments, *terms
 
     @property
     def moments(self) -> tuple[str, ...]:
-        """In clauses: commands at times that scatter, moments that stand out, and what these share."""
+        """In clauses: commands at times that scatter or follow something, moments that stand out, and what these share."""
         moments, times, shared = self.rest.outliers, self.rest.command_times, self.rest.shared
         scattered = (times.in_words,) if times is not None else ()
         if not moments or self.selection is None:
@@ -282,23 +287,27 @@ def _diagnosed(
     if isinstance(predictor, WheelPredictor):
         found = replace(found, selection=alike_in_metres(found.selection))
     left = found.rest.any or bool(found.terms)
-    words = tuple(in_words(term, predictor) for term in found.terms)
-    formula = _formula_in_words(found.formula, predictor) if not found.terms else ""
+    said, slight = said_of(found.terms, predictor), said_of(found.slight, predictor).sentences
+    formula = formula_in_words(found.formula, predictor) if not found.terms else ""
     judged = {*found.withdrawn, *found.imitating, *found.negligible}
     hint = _hint(found.selection, len(predictor.tracks), judged, left)
     tick("longer explanations")
     pairs = [] if left else _longer(found.selection, listed(found.selection.nominal.model, extra, predictor.tracks, barred))
-    notes = notes_on(found, predictor.tracks, hint, pairs, words, [in_words(t, predictor) for t in found.slight], formula)
+    notes = [*notes_on(found, predictor.tracks, hint, pairs, said.sentences, slight, formula)]
+    verdict = _verdict(found.selection, left, hint)
+    if verdict not in {"unlisted", "insufficient-data"} and isinstance(predictor, WheelPredictor):
+        notes += scatter_in_words(predictor, found.selection.problem.pose_filter.noise, found.errors)
     presented = _presented(found.selection, found.terms, found.errors_with_terms)
     contradicted = fitted_again(model, presented, contradicted=True) if found.terms or found.selection.accepted else ()
     return Diagnosis(
-        verdict=_verdict(found.selection, left, hint),
+        verdict=verdict,
         selection=found.selection,
         residual_dependence=tuple(found.dependence[:12]),
         rest=found.rest,
         formula=found.formula,
         terms=found.terms,
-        terms_in_words=words,
+        terms_in_words=said.of_each,
+        terms_said=said.sentences,
         formula_in_words=formula,
         negligible=found.negligible,
         imitating=found.imitating,
@@ -307,12 +316,6 @@ def _diagnosed(
         notes=(*notes, *(f"{said} The interval does not contain the number that was given." for said in contradicted)),
         calibration=calibrated(predictor, model, barred),
     )
-
-
-def _formula_in_words(formula: Formula | None, predictor: Predictor) -> str:
-    """"" where there is none, or of a body that has no wheels."""
-    known = formula is not None and "left_m_s" in predictor.variables()
-    return in_words(formula, predictor) if formula is not None and known else ""
 
 
 def _rejected(with_terms: PairedErrors | None) -> bool:

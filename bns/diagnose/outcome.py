@@ -22,7 +22,7 @@ from bns.diagnose.residuals.floor_field import imitating_floor
 from bns.diagnose.residuals.symbolic import Formula, best_formula
 from bns.diagnose.residuals.unexplained import NOTHING, Unexplained, unexplained, without_moments_explained
 from bns.diagnose.select.known_effects import known_effects
-from bns.diagnose.select.negligible import LEAST_FALL, fall_matters, negligible
+from bns.diagnose.select.negligible import LEAST_FALL, below_noise, fall_matters, negligible, negligible_and_errors
 from bns.diagnose.select.result import SelectionResult, certainly_lower
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import numbers_of
@@ -303,15 +303,18 @@ def _established(
 def _without_negligible(found: Established, selection: SelectionResult, predictor: Predictor) -> Established:
     """Without the effects, and the terms, that lower no held-out error of the model with all of them.
 
-    As it is where there are no terms. Where no term lowers any by itself, all stay: they are judged together later.
+    As it is where there are no terms. Where no term lowers any by itself, all stay: they are judged together later. Terms below
+    the noise are marked.
     """
     if not found.terms:
         return found
     own = tuple(term.name for term in found.terms)
     beside = replace(selection, problem=found.problem, fit=found.fit, accepted=(*found.names, *own))
-    tiny = negligible(beside)
+    tiny, errors = negligible_and_errors(beside)
     if set(own) <= set(tiny):
         tiny = tuple(name for name in tiny if name not in own)
+    faint = below_noise(errors, own)
+    found = replace(found, terms=tuple(replace(term, below_noise=term.name in faint) for term in found.terms))
     if not tiny:
         return found
     model = found.fit.model

@@ -247,7 +247,8 @@ def test_of_several_terms_those_that_lower_no_error_go_but_never_all(monkeypatch
     two = fitted(problem, one.fit, "w", "k * w * abs(w)", "unlisted-2", "speed and turn")
     found = Established((), (replace(one, fit=two.fit), two), problem, two.fit)
     asked = []
-    monkeypatch.setattr(outcome, "negligible", lambda selection: asked.append(set(selection.accepted)) or tiny)
+    mocked = lambda selection: asked.append(set(selection.accepted)) or (tiny, None)  # noqa: E731
+    monkeypatch.setattr(outcome, "negligible_and_errors", mocked)
     ended = outcome._without_negligible(found, SelectionResult(problem, one.fit, one.fit, (), ()), seen)
     assert asked == [{"unlisted", "unlisted-2"}]
     names = [("unlisted", "unlisted-2")[i - 1] for i in kept]

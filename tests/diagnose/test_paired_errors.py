@@ -11,7 +11,7 @@ import yaml
 from bns.cli.main import main
 from bns.diagnose.data.checks import checked
 from bns.diagnose.data.tracker_faults import jumps, without_faults
-from bns.diagnose.data.tracking_noise import TrackingNoise, _about, tracking_noise
+from bns.diagnose.data.tracking_noise import TrackingNoise, _about, noise_at_rest, tracking_noise
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.predict.paired_errors import FEWEST_TRIALS, Change, _Draws, paired_errors
 from bns.diagnose.predict.wheels import WheelPredictor
@@ -103,8 +103,8 @@ def test_noise_at_rest_is_not_the_robot_that_creeps():
     rng = np.random.default_rng(3)
     still[["x_m", "y_m", "heading_rad"]] = rng.normal(size=(len(still), 3)) * [0.0015, 0.0015, 0.005]
     creeps = still.assign(x_m=still["x_m"] + 0.01 * still["t_s"])
-    standing, creeping = (tracking_noise(tracks(pd.concat([driven, one], ignore_index=True))) for one in (still, creeps))
-    assert standing.basis == creeping.basis == "at rest"
+    both = [tracks(pd.concat([driven, one], ignore_index=True)) for one in (still, creeps)]
+    (standing, _), (creeping, _) = map(noise_at_rest, both)
     assert standing.position_m == pytest.approx(0.0015, rel=0.1)
     assert creeping.position_m == pytest.approx(0.0015, rel=0.15)
 

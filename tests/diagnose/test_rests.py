@@ -10,7 +10,7 @@ import pytest
 
 from bns.diagnose.data import tracking_noise as module
 from bns.diagnose.data.rests import FEWEST_LEFT, SETTLED_S, Rest, settled, told_to_stand
-from bns.diagnose.data.tracking_noise import tracking_noise
+from bns.diagnose.data.tracking_noise import noise_at_rest, tracking_noise
 
 NOISE = np.array([0.001, 0.001, 0.004])
 STEP_S = 0.01
@@ -76,7 +76,7 @@ def with_all_poses(monkeypatch, tracks):
     """The noise as it would be if all poses of a rest counted."""
     with monkeypatch.context() as patch:
         patch.setattr(module, "settled", list)
-        return tracking_noise(tracks)
+        return noise_at_rest(tracks)[0]
 
 
 def kept(tracks):
@@ -90,8 +90,7 @@ def kept(tracks):
 def test_a_robot_that_coasts_adds_little_to_the_noise(coasts, within, spin, monkeypatch):
     """A ramp ends; a lag never quite does."""
     tracks = driven(np.random.default_rng(2), rest_s=(1.0, 2.0), spin=spin, **coasts)
-    noise, before = tracking_noise(tracks), with_all_poses(monkeypatch, tracks)
-    assert noise.basis == before.basis == "at rest"
+    noise, before = noise_at_rest(tracks)[0], with_all_poses(monkeypatch, tracks)
     assert noise.position_m == pytest.approx(NOISE[0], rel=within)
     assert noise.heading_rad == pytest.approx(NOISE[2], rel=within)
     assert (before.heading_rad / NOISE[2] if spin else before.position_m / NOISE[0]) > 1.0 + within
@@ -110,7 +109,7 @@ def test_noise_of_a_robot_that_does_not_coast_is_not_cut_to_fit(memory, least, m
     """Where noise happens to be large it must not be left out: on average the estimate is the same."""
     rng = np.random.default_rng(4)
     worlds = [driven(rng, memory=memory) for _ in range(12)]
-    after = np.mean([tracking_noise(one).position_m for one in worlds])
+    after = np.mean([noise_at_rest(one)[0].position_m for one in worlds])
     assert np.mean([kept(one) for one in worlds]) >= least - 0.01
     assert least <= after / np.mean([with_all_poses(monkeypatch, one).position_m for one in worlds]) <= 1.005
 
@@ -118,7 +117,7 @@ def test_noise_of_a_robot_that_does_not_coast_is_not_cut_to_fit(memory, least, m
 def test_a_robot_that_creeps_after_driving_any_way_still_rests():
     tracks = driven(np.random.default_rng(5), creep_m_s=0.02)
     assert kept(tracks) > 0.95
-    assert tracking_noise(tracks).position_m == pytest.approx(NOISE[0], rel=0.08)
+    assert noise_at_rest(tracks)[0].position_m == pytest.approx(NOISE[0], rel=0.08)
 
 
 def test_repeated_poses_count_once():

@@ -41,6 +41,12 @@ def check_noise(setting: Setting) -> None:
             raise SpecError(f"approach bns+noise: it cannot be combined with {option}={chosen}; leave one of them out.")
 
 
+def check_missed(setting: Setting) -> None:
+    """SpecError for a price of goals missed under noise where there is no noise."""
+    if setting.options["missed"] and not setting.options["noise"]:
+        raise SpecError("approach bns+missed: goals are missed under noise, of which there is none; add some, such as noise=16.")
+
+
 def residual_sd(robot: Robot, weights: np.ndarray, patterns: PatternSet) -> np.ndarray:
     """Root mean squares (networks,), SI, of the errors of networks (networks, W) on patterns; 0 for fewer than `FEWEST`."""
     if patterns.count < FEWEST:
@@ -59,6 +65,8 @@ class NoisySimulator:
     """Standard deviations (networks,) of what one command does, SI."""
     rows: int
     foretells: bool = True
+    missed_m: float = 0.0
+    """Price beyond the robot's own penalty, m: of each goal missed, on the mean, and of the share of simulations that fail."""
 
     def score(self, population: Population, stream: RandomStream | None = None, parents: Scores | None = None) -> Scores:
         """Under the draws of the stream; goals reached are the mean, rounded. Without a stream there is no noise."""
@@ -67,8 +75,14 @@ class NoisySimulator:
             return scores
         found = self._expected(population, scores, self.networks.task, self.rows, stream)
         return scores._replace(
-            fitness=found.fitness, goals_reached=np.rint(found.goals_reached).astype(np.int32), failures=found.failures
+            fitness=self._fitness(found), goals_reached=np.rint(found.goals_reached).astype(np.int32), failures=found.failures
         )
+
+    def _fitness(self, found: Any) -> np.ndarray:
+        if not self.missed_m:
+            return np.asarray(found.fitness)
+        missed = len(self.networks.task.goals_m) - found.goals_reached + 1 - found.success
+        return np.asarray(found.fitness / (1 + found.fitness * self.missed_m * missed))  # 0, for failed arithmetic, stays 0
 
     def success(self, population: Population, task: Task, stream: RandomStream) -> tuple[np.ndarray, np.ndarray]:
         """Share of `DRAWS` noisy simulations in which a task's goals are all reached (n,), and the fitness over them (n,)."""

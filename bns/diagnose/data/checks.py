@@ -21,6 +21,8 @@ from bns.measurements import COLUMNS, LEFT_OUT, POSE, RUN_UP
 
 _HELD = DEFAULTS.data.held_share
 _USUAL = DEFAULTS.data.usual_gaps
+_BY_CHANCE = DEFAULTS.data.gaps_by_chance
+_TYPICAL = DEFAULTS.data.gaps_typical
 _JUMP_M = DEFAULTS.data.jump_m
 _JUMP_RAD = DEFAULTS.data.jump_rad
 _JUMP_ROUNDS = DEFAULTS.data.jump_rounds
@@ -348,14 +350,40 @@ def rows_of_losses(t_s: np.ndarray, tracked: np.ndarray) -> np.ndarray:
 def _losses(t_s: np.ndarray, tracked: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Between one pose and the next (poses + 1,): how many are lost; and the rows of the poses, -1 and the end around them.
 
-    A tracker that comes at uneven times leaves long gaps too: those without a row between their poses show how long.
+    A tracker that comes at uneven times leaves long gaps too: those without a row between their poses show how long. Where rows
+    of commands alone lie in gaps that are no longer, the first and the last row of a trial may be such a row as well.
     """
     at = np.flatnonzero(tracked)
-    gaps = np.diff(t_s[at])
-    usual, whole = float(np.median(gaps)), gaps[np.diff(at) == 1]
-    longest = max(usual, float(np.quantile(whole, _USUAL))) if len(whole) else usual
+    gaps, between = np.diff(t_s[at]), np.diff(at) - 1
+    usual = float(np.median(gaps))
+    longest, by_chance = _long_gaps(gaps, gaps[between == 0], np.diff(np.concatenate([t_s[:1], t_s[~tracked], t_s[-1:]])))
     marks = np.concatenate([[-1], at, [len(t_s)]])
     most = 0.501 * usual  # before the first and after the last pose one is due only where a whole interval passes
-    times = np.concatenate([[t_s[0] - most], t_s[at], [t_s[-1] + most]])
-    due = np.where(np.round(np.diff(times) / longest) > 1, np.maximum(np.round(np.diff(times) / usual) - 1, 0), 0)
-    return np.minimum(np.diff(marks) - 1, due).astype(int), marks
+    times = np.diff(np.concatenate([[t_s[0] - most], t_s[at], [t_s[-1] + most]]))
+    lacks = (np.round(times / longest) > 1) & (times > by_chance)
+    due = np.where(lacks, np.maximum(np.round(times / usual) - 1, 0), 0)
+    rows = np.diff(marks) - 1
+    if (between[~lacks[1:-1]] > 0).any():
+        rows[[0, -1]] = np.maximum(rows[[0, -1]] - 1, 0)
+    return np.minimum(rows, due).astype(int), marks
+
+
+def _long_gaps(gaps: np.ndarray, whole: np.ndarray, apart: np.ndarray) -> tuple[float, float]:
+    """The longest gap between poses that is usual, s, and how long none is by chance, s, if long ones are exponentially rarer.
+
+    How much rarer is seen in the upper quarter of the ``whole`` gaps, in which no row lies; a gap is whole the more rarely, the
+    longer it is and the less the rows without a pose are ``apart``, and counts accordingly more. Where these are too close for
+    usual ones to be whole, all ``gaps`` are looked at.
+    """
+    usual = float(np.median(gaps))
+    apart = np.sort(apart)[::-1]
+    longer = np.searchsorted(-apart, -whole)
+    clear = np.concatenate([[0.0], np.cumsum(apart)])[longer] - longer * whole
+    often = 1.0 / np.where(clear > 0.0, clear, apart.sum())
+    body = 0.5, 0.75, _USUAL
+    typical, upper, longest = np.quantile(whole, body, weights=often, method="inverted_cdf") if len(whole) else 3 * (0.0,)
+    if typical < _TYPICAL * usual:
+        _, upper, longest = np.quantile(gaps, body)
+    fall_s = (longest - upper) / np.log(0.25 / (1.0 - _USUAL))
+    rarest = max(np.log(len(gaps) * (1.0 - _USUAL) / _BY_CHANCE), 0.0)
+    return max(usual, float(longest)), float(longest + fall_s * rarest)

@@ -26,8 +26,7 @@ ORDER = DEFAULTS.data.parabola_order
 SLOWEST_HZ = DEFAULTS.data.parabola_slowest_hz
 AGREES = DEFAULTS.data.rest_agrees
 _AT_REST, _DRIVING, _BOTH = "at rest", "high frequency", "at rest, high frequency"
-_SE = 1.166
-"""Standard error of a standard deviation that is taken from the median, relative, times the root of so many normal numbers."""
+_SE = DEFAULTS.data.robust_sd_se
 
 
 @dataclass(frozen=True)
@@ -59,14 +58,21 @@ def tracking_noise(tracks: Tracks) -> TrackingNoise | None:
     """The noise of these tracks; None where they cannot tell (poses at the ends of commands alone, say)."""
     if not (tracks.left_m_s.any() or tracks.right_m_s.any()):
         return None  # no wheels, or a robot that was never told to move
-    rests, driving = settled(list(told_to_stand(tracks))), _high_frequency(tracks)
+    resting, driving = noise_at_rest(tracks), _high_frequency(tracks)
+    if resting is None or driving is None:
+        return driving if resting is None else resting[0]
+    noise, freedom = resting
+    return replace(driving, basis=_BOTH) if _agree(noise, driving, freedom) else noise
+
+
+def noise_at_rest(tracks: Tracks) -> tuple[TrackingNoise, int] | None:
+    """The noise of poses at rest alone, and how many independent poses tell of it; None where these are too few."""
+    rests = settled(list(told_to_stand(tracks)))
     poses = sum(len(rest.t_s) for rest in rests)
     if poses < FEWEST_AT_REST:
-        return driving
+        return None
     still, creeping = (_pooled([_about(rest.t_s, rest.pose, order) for rest in rests], _AT_REST) for order in (0, 1))
-    resting = creeping if creeping.position_m < DRIFTS * still.position_m else still
-    alike = driving is not None and _agree(resting, driving, poses - len(rests))
-    return replace(driving, basis=_BOTH) if driving is not None and alike else resting
+    return (creeping if creeping.position_m < DRIFTS * still.position_m else still), poses - len(rests)
 
 
 def _agree(resting: TrackingNoise, driving: TrackingNoise, freedom: int) -> bool:

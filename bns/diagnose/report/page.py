@@ -108,7 +108,7 @@ def _values(m: Material, command: Mapping[str, str]) -> dict[str, Any]:
         "causes": causes,
         "certainty": certainty(d),
         "numbers": numbers_in_words(d.selection.fit, d.effects, d.numbers) if d.selection is not None else [],
-        "moments": d.moments,
+        "moments": (*d.moments, *_of_all_terms(d)),
         "terms": _terms(d),
         "improvement": tables.improvement_text(d),
         "competing_models": _competing_models(m),
@@ -155,6 +155,11 @@ def _terms(d: Diagnosis) -> list[dict[str, str]]:
         }
         for said, term in zip(words, terms, strict=True)
     ]
+
+
+def _of_all_terms(d: Diagnosis) -> tuple[str, ...]:
+    """What terms do that is not said of each, in clauses."""
+    return () if d.terms_rejected else tuple(words for words in d.terms_said if words not in d.terms_in_words)
 
 
 def _competing_models(m: Material) -> list[dict[str, str]]:

@@ -5,7 +5,7 @@ in that direction says how late this one command was. A delay, a lag, or a limit
 times that depend on the change (how large it is, of which wheel, whether it is a turn, reverses or stops, how soon it follows):
 that is taken out, and where mostly the large changes are late, their size is the cause and nothing scatters. What is left is
 compared with the same direction later in the same command, where nothing changes: errors of a tracker and of the model are as
-large there.
+large there. Delays that follow something that is logged, such as the place, are a rule and no scatter (`delays_follow`).
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.noise import huber, weights
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.residuals.delays_follow import Changes, DelayRule, delay_rule
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.signals import CREEP_M_S
 
@@ -39,15 +40,36 @@ class CommandTimes:
     low_s: float
     high_s: float
     commands: int
+    rule: DelayRule | None = None
+    """What the delays follow, where they do: then nothing is late by chance."""
 
     @property
     def in_words(self) -> str:
         """A clause."""
+        if self.rule is not None:
+            return self.rule.in_words
         return (
             f"commands take effect at times that scatter: nine of ten between {abs(1e3 * self.low_s):.0f} ms before and "
             f"{1e3 * self.high_s:.0f} ms after the usual delay (standard deviation {1e3 * self.sd_s:.0f} ms), as if packets were "
             "lost or late, or a controller read its commands only now and then"
         )
+
+    @property
+    def note(self) -> str:
+        """What follows from it, in sentences."""
+        mean = "A lag, a late command or a late clock that is named beside this may be the mean of such delays."
+        if self.rule is None:
+            return (
+                f"No model predicts when a single command takes effect. {mean} Log when the robot carries out each command, or "
+                "let its controller acknowledge them."
+            )
+        if self.rule.of_place:
+            return (
+                f"Motors do not know where the robot is, but a camera that reads its rows one after another takes poses in one "
+                f"part of its picture later than in another, whatever their stamps say. {mean} Use a global shutter, or stamp "
+                "each pose with the time at which its row was read."
+            )
+        return mean
 
 
 @dataclass(frozen=True)
@@ -83,7 +105,9 @@ def command_times(problem: Problem, fit: Fit) -> CommandTimes | None:
     late_s = _delays(problem, fit, predictor, clear)
     late_s = late_s - np.median(late_s)
     low_s, high_s = (float(v) for v in np.quantile(late_s, [0.05, 0.95]))
-    return CommandTimes(float(late_s.std()), low_s, high_s, len(clear))
+    seen = [(c.trial, c.command, c.after.start) for c in clear]
+    rule = delay_rule(tracks, fit.model.wheelbase_m, Changes(*np.array(seen).T), late_s)
+    return CommandTimes(float(late_s.std()), low_s, high_s, len(clear), rule)
 
 
 def _changes(tracks: Tracks) -> Iterator[_Change]:

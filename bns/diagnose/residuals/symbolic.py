@@ -65,11 +65,23 @@ class Formula:
     name: str = NAME
     signal: str = ""
     """What it is a function of, in words."""
+    below_noise: bool = False
+    """Is the error without it higher by less than tracking noise (`bns.diagnose.select.negligible.below_noise`)?"""
 
     @property
     def values(self) -> dict[str, float]:
         """The fitted numbers of the formula."""
         return self.fit.model.values_of(self.name)
+
+    @property
+    def certain(self) -> bool:
+        """Does the interval of any of its factors (k, k0, ...) leave out 0? Else the term may be nothing.
+
+        What it earns on held-out trials is no answer: that is worked out to first order, and where the filter starts again
+        after poses that are far off, the loss has steps, beside which a tiny number earns much.
+        """
+        own = [j for j, free in enumerate(self.fit.free) if free.effect == self.name and free.parameter.name.startswith("k")]
+        return any(low > 0.0 or high < 0.0 for low, high in map(self.fit.interval, own))
 
 
 def free_name(model: Model) -> str:
@@ -79,10 +91,10 @@ def free_name(model: Model) -> str:
 
 
 def best_formula(problem: Problem, fit: Fit, dependence: Sequence[ResidualDependence]) -> Formula | None:
-    """The formula that earns most along the patterns that were found; None if none earns anything."""
+    """The formula that earns most along the patterns that were found; None if none earns anything for certain."""
     tried = each(partial(_tried, problem, fit), dependence[:3])
     return max(
-        (f for of_one in tried for f in of_one if f.paired_comparison.elpd_diff > 0),
+        (f for of_one in tried for f in of_one if f.paired_comparison.elpd_diff > 0 and f.certain),
         key=lambda f: f.paired_comparison.elpd_diff,
         default=None,
     )

@@ -32,6 +32,7 @@ from bns.diagnose.residuals.grammar import (
 from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.formula import LEFT, NEVER_M, RIGHT, SHARE, names_in, value_of
+from bns.physics.model import Model
 
 _POINTS = 400
 _ALIKE = DEFAULTS.report.same_share
@@ -47,7 +48,7 @@ def in_words(term: Formula, predictor: Predictor) -> str:
         v = term.values
         there = f"within {abs(v['c']):.3g} m of ({v['a']:.3g}, {v['b']:.3g}) m"
         if term.on in {"east", "north"}:
-            return f"{_VELOCITIES[term.on]} differs by {1e3 * v['k']:+.3g} mm/s {there}"
+            return f"{VELOCITIES[term.on]} differs by {1e3 * v['k']:+.3g} mm/s {there}"
         if term.on == "s":
             return f"the robot slides to the {'right' if v['k'] >= 0 else 'left'} by {abs(v['k']):.2%} of its speed {there}"
         motion = {"v": " in forward motion", "w": " in its turns"}.get(term.on, "")
@@ -55,11 +56,11 @@ def in_words(term: Formula, predictor: Predictor) -> str:
     said = _SAID.get((term.signal, term.on))
     if said:
         return said(term, predictor)
-    what, of = _VELOCITIES[term.on], term.signal or _variables(term)
+    what, of = VELOCITIES[term.on], term.signal or variables_of(term)
     return f"{what} {'differs from its command' if of == what else f'depends on {of}'} ({_largest(term, predictor)})"
 
 
-_VELOCITIES = {
+VELOCITIES = {
     "v": "forward velocity",
     "w": "turning velocity",
     "s": "sideways velocity",
@@ -87,7 +88,7 @@ _NAMES = {
 }
 
 
-def _variables(term: Formula) -> str:
+def variables_of(term: Formula) -> str:
     """What a formula without a signal is a function of."""
     used = names_in(term.term)
     found = list(dict.fromkeys(text for name, text in _NAMES.items() if name in used)) or ["whether a wheel turns"]
@@ -107,10 +108,11 @@ def _along(term: Formula, name: str, grid: Array, what: str) -> str:
     """A share of all velocities along a signal, where it is lowest and highest."""
     share = _curve(term, name, grid)
     low, high = int(share.argmin()), int(share.argmax())
-    return f"{_slower(-share[low])} at {_seconds(grid[low])} {what}, {_slower(-share[high])} at {_seconds(grid[high])}"
+    return f"{_slower(-share[low])} at {seconds(grid[low])} {what}, {_slower(-share[high])} at {seconds(grid[high])}"
 
 
-def _seconds(time_s: float) -> str:
+def seconds(time_s: float) -> str:
+    """A time (s) in three digits, or more where it is long."""
     return f"{time_s:.3g} s" if abs(time_s) < 100.0 else f"{time_s:.0f} s"
 
 
@@ -127,7 +129,7 @@ def _session(term: Formula, predictor: Predictor) -> str:
     share = _curve(term, "t", grid, u=1.0, w=1.0)
     most = int(np.abs(share).argmax())
     whose = {LEFT: "the left wheel is", RIGHT: "the right wheel is"}.get(term.on, "the robot's turning is")
-    return f"{whose} {_slower(-share[most])} at {_seconds(grid[most])} of the session than at its beginning"
+    return f"{whose} {_slower(-share[most])} at {seconds(grid[most])} of the session than at its beginning"
 
 
 def _heading(term: Formula, _: Predictor) -> str:
@@ -157,7 +159,7 @@ def _by_heading(term: Formula, predictor: Predictor) -> str:
     size, unit = (np.degrees(change), "°/s") if term.on == "w" else (1e3 * change, "mm/s")
     at = [f"{size[i]:+.2g} {unit} at a heading of {np.degrees(grid[i]):.0f}°" for i in (change.argmax(), change.argmin())]
     speed = "" if term.on == "w" and term.signal != PULL else f" at {usual:.2g} m/s"
-    return f"{_VELOCITIES[term.on]}{speed} depends on heading: {at[0]}, {at[1]}"
+    return f"{VELOCITIES[term.on]}{speed} depends on heading: {at[0]}, {at[1]}"
 
 
 def _travel(term: Formula, _: Predictor) -> str:
@@ -216,7 +218,7 @@ def _speed(term: Formula, predictor: Predictor) -> str:
 
 def _surface(term: Formula, predictor: Predictor) -> str:
     """Of a free surface over speed and turn rate: how much, from the least to the most that usual commands see, and where."""
-    v, w = _driven(term, predictor)
+    v, w = driven(term.fit.model, predictor)
     own, knots = (w, SURFACE_KNOTS[1]) if term.on == "w" else (v, SURFACE_KNOTS[0])
     change = np.broadcast_to(value_of(term.term, {**term.values, "v": v, "w": w, "moving": np.ones_like(v)}), v.shape)
     said: Callable[[float], str] = _slower_share
@@ -225,7 +227,7 @@ def _surface(term: Formula, predictor: Predictor) -> str:
         change, kept = change * np.sign(own), np.abs(own) >= knots[1] * np.abs(own).max()
         said = _slower_turn if term.on == "w" else _slower_way
     if not kept.any():
-        return f"{_VELOCITIES[term.on]} depends on {term.signal} ({_largest(term, predictor)})"
+        return f"{VELOCITIES[term.on]} depends on {term.signal} ({_largest(term, predictor)})"
     change, v, w = change[kept], v[kept], w[kept]
     order = np.argsort(change)
     least, most = (order[int(end * (len(order) - 1))] for end in _ENDS)
@@ -236,14 +238,14 @@ def _surface(term: Formula, predictor: Predictor) -> str:
     return f"the robot {verb} {', '.join(at)}"
 
 
-def _driven(term: Formula, predictor: Predictor) -> tuple[Array, Array]:
-    """Forward velocity and turn rate in every command: what the effects of the wheels leave of them."""
+def driven(model: Model, predictor: Predictor) -> tuple[Array, Array]:
+    """Forward velocity (m/s) and turn rate (rad/s) in every command, (steps,): what effects of the wheels leave of them."""
     seen = predictor.variables()
     left, right = seen["left_m_s"].ravel(), seen["right_m_s"].ravel()
     if isinstance(predictor, WheelPredictor):
-        turned = predictor.turned(term.fit.model)
+        turned = predictor.turned(model)
         left, right = turned.left_m_s.ravel(), turned.right_m_s.ravel()
-    return (left + right) / 2.0, (right - left) / term.fit.model.wheelbase_m
+    return (left + right) / 2.0, (right - left) / model.wheelbase_m
 
 
 def _slower_share(change: float) -> str:
@@ -296,7 +298,7 @@ def _response(term: Formula, _: Predictor) -> str:
     end = float(speed[-1])
     if end <= 0.0 or float(speed.max()) >= 2.0 * end:  # no linear drive without zeros overshoots by a whole step
         return (
-            f"{_VELOCITIES[term.on]} depends on its commands of the last {RESPONSE_KNOTS_S[-1]:g} s, but not as the response "
+            f"{VELOCITIES[term.on]} depends on its commands of the last {RESPONSE_KNOTS_S[-1]:g} s, but not as the response "
             "of a drive to a step does"
         )
     half_s = float(grid[np.argmax(speed >= end / 2.0)])

@@ -16,7 +16,7 @@ from bns.diagnose.estimate.cross_validation import held_out_steps
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.lacking import fit_without
 from bns.diagnose.estimate.parameters import FreeParameter
-from bns.diagnose.predict.paired_errors import PairedErrors, paired_errors
+from bns.diagnose.predict.paired_errors import HorizonErrors, PairedErrors, paired_errors
 from bns.diagnose.select.result import SelectionResult
 from bns.diagnose.settings import DEFAULTS
 
@@ -24,6 +24,7 @@ LEAST_FALL = DEFAULTS.select.least_fall
 LUCK = DEFAULTS.select.least_fall_luck
 MEDIAN_OF = DEFAULTS.select.least_fall_windows
 LEAST_SHIFT = DEFAULTS.select.least_shift
+SLIGHT = DEFAULTS.residuals.slight_excess
 _NO_WIDTH = DEFAULTS.report.no_width
 _ALL = "all"
 
@@ -35,6 +36,11 @@ def negligible(selection: SelectionResult) -> tuple[str, ...]:
     are kept, so of two that can stand for one another one is kept. An effect alone is judged, too: white noise of a tracker, or
     cycles that hardly scatter, can make certain what no error shows.
     """
+    return negligible_and_errors(selection)[0]
+
+
+def negligible_and_errors(selection: SelectionResult) -> tuple[tuple[str, ...], PairedErrors | None]:
+    """As `negligible`; and the held-out errors without each of the others, and with all of these. None where none is left."""
     dropped: tuple[str, ...] = ()
     while len(kept := tuple(name for name in selection.accepted if name not in dropped)):
         fits = _without_each(selection, dropped, kept)
@@ -43,9 +49,25 @@ def negligible(selection: SelectionResult) -> tuple[str, ...]:
         firm = {name for name in kept if falls[name] >= LEAST_FALL}
         tiny = [name for name in kept if name not in firm and not shifted(fits[_ALL], fits[name], firm)]
         if not tiny:
-            break
+            return dropped, errors
         dropped = (*dropped, min(tiny, key=lambda name: falls[name]))
-    return dropped
+    return dropped, None
+
+
+def below_noise(errors: PairedErrors | None, names: Sequence[str]) -> tuple[str, ...]:
+    """Those without which the held-out error is higher by less than tracking noise (`slight_excess`), at every horizon.
+
+    ``errors``: of `negligible_and_errors`. Root sums of squares are compared, as of all that is left. None where the tracks do
+    not tell their noise.
+    """
+    at_horizons = [at for at in errors.horizons.values() if at.windows] if errors is not None else []
+    judged = {model.name for at in at_horizons for model in at.models}
+    return tuple(name for name in names if name in judged and all(_excess(at, name) < SLIGHT for at in at_horizons))
+
+
+def _excess(at: HorizonErrors, name: str) -> float:
+    """Of the error without something over that with all, as root difference of squares; in tracking noises. NaN if unknown."""
+    return math.sqrt(max(at.rms_of(name) ** 2 - at.rms_of(_ALL) ** 2, 0.0)) / at.noise_floor_m
 
 
 def fall_matters(errors: PairedErrors, before: str, after: str) -> bool:

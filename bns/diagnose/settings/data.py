@@ -5,22 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from bns.diagnose.settings.gaps import Gaps
 from bns.diagnose.settings.setting import BY_HAND, setting
 from bns.diagnose.settings.stamps import Stamps
 
 
 @dataclass(frozen=True)
-class Data(Stamps):
+class Data(Gaps, Stamps):
     """``data/``: checks of tables, division of a log into trials, tracks, tracker faults, tracking noise."""
 
-    usual_gaps: float = setting(
-        0.95,
-        "1",
-        "Of the gaps between poses that follow each other row by row, so that none is lost between them, this fraction is no "
-        "longer than usual. Poses are lost where rows without one lie in a gap that is nearer to two such gaps than to one. With "
-        "the median, a tracker whose frames come every 33 to 100 ms seemed to lose 16 to 26 poses of 130 where about 4 were "
-        "lost (another author's log), now 14 at most; the rest of 5 % leaves room for rows that were not written.",
-    )
     held_share: float = setting(
         0.2,
         "1",
@@ -378,6 +371,12 @@ class Data(Stamps):
         "Where the scatter at rest and that at high frequency while the robot drives differ by less, the latter is taken, which "
         "comes of more poses: 30 poses at rest know the noise to 13 % only. Of 1000 logs with the same noise in both, 3 differ "
         "by more.",
+    )
+    robust_sd_se: float = setting(
+        1.166,
+        "1",
+        "Relative standard error of a standard deviation from the median of the sizes, times the root of the number of values: "
+        "half of the inverse of the normal quartile and of the density of sizes there.",
     )
     drift_at_rest: float = setting(
         0.5,

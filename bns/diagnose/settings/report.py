@@ -58,6 +58,46 @@ class Report:
     surface_ends: tuple[float, float] = setting(
         (0.05, 0.95), "of the commands", f"Quantiles between which the words give the values of such a surface; {BY_HAND}."
     )
+    cancel_steps: float = setting(
+        0.1,
+        "of the time",
+        "Each of several flexible terms is judged where its contributions to a velocity are largest, either way: in so much of "
+        f"the time in which the robot drove; {BY_HAND}.",
+    )
+    cancel_part: float = setting(
+        0.5,
+        "of its contribution",
+        "If all terms together leave less of a term there, a sentence about it would be false, and none is said. Of terms that "
+        "cancel -0.5 to 0.3 was left (eight terms for firmware that keeps turns, another author's simulator), of terms for "
+        "unlike wheels 1.0. Nor is anything said of a neighbourhood where the poses differ from the sum by more than this share.",
+    )
+    cancel_side: float = setting(
+        0.2,
+        "of the other side",
+        "What a term adds to one side is judged if it is larger than this share of what it adds to the other; "
+        f"{BY_HAND}.",
+    )
+    together_cell: float = setting(
+        0.2,
+        "of the fastest",
+        "Width of a neighbourhood of speeds and turn rates, or of half the range of places and times, over which the change that "
+        f"all terms make is a median: eleven a variable; {BY_HAND}.",
+    )
+    together_driven: float = setting(
+        0.01,
+        "of the time",
+        "Of a neighbourhood in which the robot drove for less, nothing is said. With 60 trials of 8 s it is some five commands.",
+    )
+    together_nothing: float = setting(
+        0.1,
+        "of the largest change",
+        f"The words say that the terms leave a velocity as it is where they change it by less than this share; {BY_HAND}.",
+    )
+    together_least: float = setting(
+        0.01,
+        "of the usual velocity",
+        f"A change of a velocity that is smaller everywhere is not said beside others; {BY_HAND}.",
+    )
     formula_width: int = setting(
         90, "characters", f"A longer formula is not shown in the terminal, only said where it is written; {BY_HAND}."
     )

@@ -217,6 +217,18 @@ class Verdict:
         "1",
         f"An effect that would have gained this fraction of the loss, but is rejected, is mentioned; {BY_HAND}.",
     )
+    scatter_notable: float = setting(
+        2.0,
+        "of the tracking noise",
+        "Where nothing is left and the error is larger by this factor, the scatter of the drive is named as its cause; "
+        f"{BY_HAND}.",
+    )
+    scatter_explains: float = setting(
+        0.7,
+        "1",
+        "The scatter of the drive, with tracking noise, is named as the cause of an error if it makes at least this fraction of "
+        f"it, and not so much more than all of it: half of the mean square; {BY_HAND}.",
+    )
     outgrown: float = setting(
         2.0,
         "1",

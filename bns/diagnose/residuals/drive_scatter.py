@@ -1,0 +1,51 @@
+"""What a drive that wanders at random adds to the error: why it is above tracking noise where nothing systematic is left."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bns.diagnose.data.tracks import Array
+from bns.diagnose.predict.base import Predictor
+from bns.diagnose.predict.horizons import IN_WORDS
+from bns.diagnose.predict.paired_errors import PairedErrors
+from bns.diagnose.settings import DEFAULTS
+
+NOTABLE = DEFAULTS.verdict.scatter_notable
+EXPLAINS = DEFAULTS.verdict.scatter_explains
+
+
+def wandering_m(predictor: Predictor, noise: Array, horizon: str) -> float:
+    """Root mean square position error (m) over the windows of a horizon, by the drive's scatter alone.
+
+    ``noise`` as `filter_gains` takes it: its last three are the scatter forward and sideways (m) and of the heading (rad), each
+    per root of a metre driven. A change of heading on the way moves the end by as much as the end is away from there. NaN where
+    there are no windows.
+    """
+    forward, sideways, heading = (float(value) ** 2 for value in noise[2:5])
+    place, way_m = predictor.tracks.pose[:, :2], predictor.way_m
+    squares = []
+    for start, end in zip(*predictor.windows(horizon), strict=True):
+        driven = slice(start + 1, end + 1)
+        away = ((place[end] - place[driven]) ** 2).sum(axis=1)
+        squares.append(float((way_m[driven] * (forward + sideways + heading * away)).sum()))
+    return float(np.sqrt(np.mean(squares))) if squares else float("nan")
+
+
+def scatter_in_words(predictor: Predictor, noise: Array, errors: PairedErrors) -> list[str]:
+    """A sentence where the error at the longest horizon is far above tracking noise and the drive's scatter makes it."""
+    longest = [horizon for horizon, at in errors.horizons.items() if at.windows][-1:]
+    if not longest:
+        return []
+    horizon = longest[0]
+    at = errors.horizons[horizon]
+    error, floor = at.models[-1].rms_m, at.noise_floor_m
+    by_drive = wandering_m(predictor, noise, horizon)
+    if not (error > NOTABLE * floor and EXPLAINS < np.hypot(by_drive, floor) / error < 1.0 / EXPLAINS):
+        return []
+    ahead, aside, turn = 1e3 * noise[2], 1e3 * noise[3], np.degrees(noise[4])
+    return [
+        f"The error over {IN_WORDS[horizon]} ({1e3 * error:.3g} mm) is above tracking noise ({1e3 * floor:.3g} mm) because the "
+        f"drive itself scatters: by {ahead:.3g} mm ahead, {aside:.3g} mm to the side and {turn:.3g}° in the first metre, and "
+        f"with the root of the way, which makes {1e3 * by_drive:.3g} mm. No model predicts such scatter: no listed effect and "
+        "no curve finds a pattern in it."
+    ]
