@@ -1,7 +1,8 @@
 """Success of some options of BNS, and what limits it: networks, the world without its noise, its noise, or no approach at all.
 
 `python -m analysis.limits [--runs ARCHIVE] [--lists CSV] [--drives CSV] [--out PNG]`: by default from what is published:
-the archive of the sweep ``noise``, the lists of `analysis.ceiling`, and the rows of `analysis.margins` of the same runs.
+the archive of the sweep ``noise``, the lists of `analysis.ceiling`, and the rows of `analysis.margins` of the same runs. Then the
+table of the sweep ``noise-late``, from its own archive and drives.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from analysis.results import Results
 from bns.plotting.style import GREY, OKABE_ITO, PAGE_IN, lettered, style
 
 PUBLISHED = Path(__file__).parents[1] / "results" / "published"
-SWEEP, PHYSICS, BASE = "noise", "noise-physics", "bns+margin=0.03"
+SWEEP, PHYSICS, BASE, LATE = "noise", "noise-physics", "bns+margin=0.03", "noise-late"
 APPROACHES = ("bns", BASE, "bns+noise=16", "bns+noise=16+margin=0.01+renew=10")
 _COLOURS = (OKABE_ITO[0], OKABE_ITO[4], OKABE_ITO[1], OKABE_ITO[2])
 LAST, EARLY, LATEST = 5, 20, 5
@@ -33,7 +34,7 @@ _PLACES = {"simulated": "networks", "quiet": "world without noise", "noisy": "wo
 def evaluations(store: Results, sweep: str = SWEEP) -> pd.DataFrame:
     """A row an evaluation of the seeds that all approaches have: task, approach, seed, evaluation, success (within 7 cm)."""
     rows = store.query(f"""
-        SELECT task, approach, seed, evaluation, evals.success::INT AS success, cpu_s
+        SELECT task, approach, seed, evaluation, evals.success::INT AS success, cpu_s, robot_s
         FROM evals JOIN (SELECT run_id, sweep, cpu_s FROM runs WHERE status = 'ok' AND sweep = '{sweep}') USING (run_id, sweep)
         ORDER BY task, approach, seed, evaluation""")
     have = rows.groupby(["task", "seed"]).approach.transform("nunique")
@@ -83,6 +84,25 @@ def in_words(table: pd.DataFrame) -> list[str]:
         lines.append(
             f"| {row.task} | `{row.approach}` | {row.end:.0f} % ({row.end_low:.0f}–{row.end_high:.0f}) "
             f"| {row.last:.0f} % ({row.last_low:.0f}–{row.last_high:.0f}) | {change.replace('-', '−')} | {row.early:.0f} % |"
+        )
+    return lines
+
+
+def late_in_words(rows: pd.DataFrame, drives: pd.DataFrame) -> list[str]:
+    """Rows of the table of `LATE`: with the success of final controllers in the world, ``drives`` as `limits` takes them, and
+    medians of a run's robot minutes and CPU seconds."""
+    found, lines = limits(drives).set_index(["task", "approach"]), []
+    each = dict(tuple(rows.groupby(["task", "approach"])))
+    for task, approach in sorted(each, key=lambda one: (list(ceiling.TASKS).index(one[0]), one[1])):
+        own = each[task, approach]
+        shares, at_end = _of_seeds(own), own[own.evaluation == own.evaluation.max()]
+        low, high = (100 * float(end) for end in wilson(at_end.success.sum(), len(at_end)))
+        last, world = _interval("last", shares["last"].to_numpy()), found.loc[(task, approach)]
+        lines.append(
+            f"| {task} | `{approach}` | {100 * at_end.success.mean():.0f} % ({low:.0f}–{high:.0f}) "
+            f"| {last['last']:.0f} % ({last['last_low']:.0f}–{last['last_high']:.0f}) "
+            f"| {world.noisy:.0f} % ({world.noisy_low:.0f}–{world.noisy_high:.0f}) | {100 * shares.early.mean():.0f} % "
+            f"| {at_end.robot_s.median() / 60:.0f} | {at_end.cpu_s.median():.1f} |"
         )
     return lines
 
@@ -162,6 +182,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for lines in (in_words(compared(rows)), in_words(compared(elsewhere)), limits_in_words(found)):
         print(*lines, sep="\n")
     print(possible.round(1).to_string(index=False))
+    late = evaluations(Results(PUBLISHED / f"{LATE}.parquet", archived=True), LATE)
+    print(*late_in_words(late, pd.read_csv(PUBLISHED / f"{LATE}-drives.csv")), sep="\n")
     with style():
         drawn(rows, found, possible).savefig(wanted.out)
     return 0

@@ -60,6 +60,13 @@ def test_what_is_said_of_pairs_is_what_the_archive_gives():
     ]
 
 
+def test_what_is_said_of_missed_goals_that_count_more_is_what_its_archive_gives():
+    rows = limits.evaluations(Results(limits.PUBLISHED / "noise-late.parquet", archived=True), limits.LATE)
+    said = limits.late_in_words(rows, pd.read_csv(limits.PUBLISHED / "noise-late-drives.csv"))
+    assert len(said) == 6
+    assert "\n".join(said) in TEXT
+
+
 def test_what_is_said_of_noise_is_what_its_archive_and_its_drives_give():
     published = limits.PUBLISHED
     rows = limits.evaluations(Results(published / "noise.parquet", archived=True))
