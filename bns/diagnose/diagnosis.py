@@ -15,6 +15,7 @@ from bns.diagnose.estimate.cancelling import cancelled
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.plausibility import fitted_again
 from bns.diagnose.estimate.significance import fewest_trials
+from bns.diagnose.estimate.smoothing_tracker import LATE
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.outcome import alike_in_metres, outcome_of, predicts_better_throughout
 from bns.diagnose.parallel import one_thread_each
@@ -162,7 +163,7 @@ class Diagnosis:
         """The numbers of the effects: where terms were found that may be added, as fitted beside these, which keep them unbiased.
 
         Of single relative motions: as calibrated together, since an effect that was not accepted has a number there, too. Numbers
-        that cancel a part of a term are marked ``cancels``.
+        that cancel a part of a term are marked ``cancels``; delays beside commands that come at times that differ, ``of_mean``.
         """
         if self.selection is None:
             return {}
@@ -176,6 +177,9 @@ class Diagnosis:
             past = any(term.signal in PAST for term in self.terms)
             for one in cancelled(self.selection.fit, fit, self.selection.accepted, past):
                 found[one.name][one.parameter.name]["cancels"] = True
+        for name in LATE if self.rest.command_times is not None else ():
+            if name in found:
+                found[name][LATE[name]]["of_mean"] = True
         return found
 
     def _without_worst(self) -> dict[str, Any] | None:

@@ -1,5 +1,7 @@
 """An effect and a free term that cancel in part: a note says so, and the sentence takes no side."""
 
+from copy import deepcopy
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -157,3 +159,18 @@ def test_nor_does_it_give_a_lag_of_which_a_free_response_has_the_most(monkeypatc
         assert ("cancels" in number) is cancels
         said = _number("tau_s", number | {"unit": "s", "low": 0.01, "high": 0.03})
         assert said == f"tau_s = 0.02 s (95 %: 0.01 to 0.03{', together with the free term only: see the notes' * cancels})"
+
+
+def test_nor_does_it_give_the_mean_of_delays_that_differ(monkeypatch):
+    """A controller that reads its commands every 0.12 s: half of that is no lag of the motors."""
+    values = {"motor-lag": {"tau_s": {"value": 0.06}}, "wheelbase": {"factor": {"value": 1.02}}}
+    monkeypatch.setattr("bns.diagnose.diagnosis.numbers_of", lambda _: deepcopy(values))
+    selection = SimpleNamespace(fit=fit_of((*LAG, 0.06, 0.05, 0.07)), accepted=("motor-lag", "wheelbase"))
+    scattered = replace(NOTHING, command_times=SimpleNamespace())
+    numbers = Diagnosis("unlisted", selection, rest=scattered).numbers
+    assert numbers["motor-lag"]["tau_s"]["of_mean"]
+    assert "of_mean" not in numbers["wheelbase"]["factor"]
+    assert "of_mean" not in Diagnosis("effects", selection).numbers["motor-lag"]["tau_s"]
+    said = _number("tau_s", numbers["motor-lag"]["tau_s"] | {"unit": "s", "low": 0.05, "high": 0.07})
+    assert said == "tau_s = 0.06 s (95 %: 0.05 to 0.07, perhaps only the mean of delays that differ: see the notes)"
+    assert sized_sentence(effect_named("motor-lag"), numbers["motor-lag"]) == effect_named("motor-lag").sentence

@@ -22,7 +22,7 @@ def sized_sentence(effect: Effect, numbers: Mapping[str, Mapping[str, Any]]) -> 
     """
     if effect.sized_by is not None:
         each = [numbers.get(p.name, {}) for p in effect.parameters]
-        readable = all(n.get("value") is not None and not n.get("per_trial") and not n.get("cancels") for n in each)
+        readable = all(n.get("value") is not None and _alone(n) for n in each)
         values = {p.name: float(n["value"]) for p, n in zip(effect.parameters, each, strict=True)} if readable else {}
         return (effect.sized_by(values) if values else "") or effect.in_words
     if not effect.sized:
@@ -39,13 +39,18 @@ def sized_sentence(effect: Effect, numbers: Mapping[str, Mapping[str, Any]]) -> 
     return "".join(said)
 
 
+def _alone(number: Mapping[str, Any]) -> bool:
+    """May the number be read by itself?"""
+    return not any(number.get(mark) for mark in ("per_trial", "cancels", "of_mean"))
+
+
 def _said(p: Parameter, number: Mapping[str, Any], words: str) -> Iterator[str]:
     """A number alone; with ``words`` ("above|below") how far it is from neutral, and to which side; nothing if that is open.
 
     With a plus before the words a side is said even then: a place has two coordinates, and one of them may be 0.
     """
     value, low, high = (number.get(key) for key in ("value", "low", "high"))
-    if value is None or not np.isfinite(value) or number.get("per_trial") or number.get("cancels"):
+    if value is None or not np.isfinite(value) or not _alone(number):
         return
     if not words:
         yield _size(value, p)
