@@ -1,13 +1,18 @@
 """The scatter of a drive as the cause of an error: compared with a walk at random that is drawn here, frame by frame."""
 
+import re
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from bns.diagnose import diagnosis
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.drive_scatter import scatter_in_words, wandering_m
+from tests.diagnose.worlds import NOMINAL, measured
 
-NOISE = np.array([0.001, 0.005, 0.004, 0.002, 0.02])
+NOISE = np.array([0.0005, 0.002, 0.008, 0.004, 0.05])
 """Of a pose (m, rad); of the drive for a metre: ahead, aside (m), heading (rad)."""
 
 
@@ -50,6 +55,13 @@ def test_windows_count_by_their_mean_squares():
     assert np.isnan(wandering_m(robot(path, np.zeros((0, 2), dtype=int)), NOISE, "trial"))
 
 
+def test_what_was_driven_before_a_window_adds_nothing():
+    path = curved()
+    from_afar = np.concatenate([path[:20] - [3.0, 0.0], path[20:]])
+    both = [wandering_m(robot(one, [(20, 90)]), NOISE, "trial") for one in (path, from_afar)]
+    assert both[0] == pytest.approx(both[1], rel=1e-12)
+
+
 def errors(rms_m, floor_m=0.002, windows=5):
     models = (SimpleNamespace(rms_m=1.0), SimpleNamespace(rms_m=rms_m))
     at = SimpleNamespace(models=models, noise_floor_m=floor_m, windows=windows)
@@ -63,9 +75,43 @@ def test_it_is_said_where_it_makes_the_error_and_the_error_is_above_noise():
     (said,) = scatter_in_words(predictor, NOISE, errors(1.2 * by_drive))
     assert f"over 5 seconds ({1.2e3 * by_drive:.3g} mm)" in said
     assert f"which makes {1e3 * by_drive:.3g} mm" in said
-    assert "4 mm ahead, 2 mm to the side and 1.15°" in said
+    assert "8 mm ahead, 4 mm to the side and 2.86°" in said
     assert scatter_in_words(predictor, NOISE, errors(1.7 * by_drive)) == []  # something else makes most of it
     assert scatter_in_words(predictor, NOISE, errors(0.6 * by_drive)) == []  # it scatters in another way
     assert scatter_in_words(predictor, NOISE, errors(by_drive, floor_m=0.6 * by_drive)) == []  # near noise: no question
     assert scatter_in_words(predictor, NOISE, errors(by_drive, floor_m=np.nan)) == []
     assert scatter_in_words(predictor, NOISE, SimpleNamespace(horizons={})) == []
+
+
+def scattered(table, rng):
+    """The same drives with steps that scatter as NOISE says, frame by frame, and its noise of poses."""
+    table = table.copy()
+    for _, rows in table.groupby("trial").groups.items():
+        pose = table.loc[rows, ["x_m", "y_m", "heading_rad"]].to_numpy()
+        steps, heading = np.diff(pose, axis=0), pose[:-1, 2]
+        root = np.sqrt(np.hypot(*steps[:, :2].T))
+        cos, sin = np.cos(heading), np.sin(heading)
+        ahead, left = cos * steps[:, 0] + sin * steps[:, 1], cos * steps[:, 1] - sin * steps[:, 0]
+        off = rng.normal(size=(3, len(steps))) * NOISE[2:, None] * root
+        turned = heading + np.append(0.0, np.cumsum(off[2])[:-1])
+        x = np.cos(turned) * (ahead + off[0]) - np.sin(turned) * (left + off[1])
+        y = np.sin(turned) * (ahead + off[0]) + np.cos(turned) * (left + off[1])
+        walked = pose[0] + np.vstack([np.zeros(3), np.cumsum(np.column_stack([x, y, steps[:, 2] + off[2]]), axis=0)])
+        walked += rng.normal(size=walked.shape) * NOISE[[0, 0, 1]]
+        table.loc[rows, ["x_m", "y_m", "heading_rad"]] = walked
+    return table
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("verdict", ["", "insufficient-data"])
+def test_a_diagnosis_that_finds_nothing_says_so_and_one_that_cannot_tell_does_not(verdict, monkeypatch):
+    if verdict:
+        monkeypatch.setattr(diagnosis, "_verdict", lambda *_: verdict)
+    driven = measured(NOMINAL, trials=24, seed=5, noise=(0.0, 0.0), jitter=0.0, commands=12)
+    found = diagnosis.diagnose(WheelPredictor(tracks_of(scattered(driven, np.random.default_rng(1)))), NOMINAL)
+    assert found.verdict == (verdict or "none")
+    said = [note for note in found.notes if "drive itself scatters" in note]
+    assert len(said) == (not verdict)
+    if said:
+        numbers = [float(one) for one in re.findall(r"by ([\d.]+) mm ahead, ([\d.]+) mm to the side and ([\d.]+)°", said[0])[0]]
+        assert numbers == pytest.approx([1e3 * NOISE[2], 1e3 * NOISE[3], np.degrees(NOISE[4])], rel=0.3)
