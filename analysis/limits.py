@@ -41,13 +41,13 @@ def evaluations(store: Results, sweep: str = SWEEP) -> pd.DataFrame:
     return rows[have == rows.approach.nunique()]
 
 
-def compared(rows: pd.DataFrame) -> pd.DataFrame:
+def compared(rows: pd.DataFrame, approaches: Sequence[str] = APPROACHES, base_name: str = BASE) -> pd.DataFrame:
     """By task and approach: runs, per cent of success at the last evaluation with its Wilson interval, over the first and the
-    last evaluations with bootstrap intervals over seeds, and the paired change of the latter from `BASE`."""
+    last evaluations with bootstrap intervals over seeds, and the paired change of the latter from the base."""
     table = []
     for task in ceiling.TASKS:
-        base = _of_seeds(rows[(rows.task == task) & (rows.approach == BASE)])
-        for approach in (name for name in APPROACHES if name in set(rows.approach)):
+        base = _of_seeds(rows[(rows.task == task) & (rows.approach == base_name)])
+        for approach in (name for name in approaches if name in set(rows.approach)):
             own = rows[(rows.task == task) & (rows.approach == approach)]
             shares = _of_seeds(own)
             at_end = own[own.evaluation == own.evaluation.max()].success
@@ -92,17 +92,15 @@ def late_in_words(rows: pd.DataFrame, drives: pd.DataFrame) -> list[str]:
     """Rows of the table of `LATE`: with the success of final controllers in the world, ``drives`` as `limits` takes them, and
     medians of a run's robot minutes and CPU seconds."""
     found, lines = limits(drives).set_index(["task", "approach"]), []
-    each = dict(tuple(rows.groupby(["task", "approach"])))
-    for task, approach in sorted(each, key=lambda one: (list(ceiling.TASKS).index(one[0]), one[1])):
-        own = each[task, approach]
-        shares, at_end = _of_seeds(own), own[own.evaluation == own.evaluation.max()]
-        low, high = (100 * float(end) for end in wilson(at_end.success.sum(), len(at_end)))
-        last, world = _interval("last", shares["last"].to_numpy()), found.loc[(task, approach)]
+    names = sorted(set(rows.approach))
+    for row in compared(rows, names, names[0]).itertuples():
+        world = found.loc[(row.task, row.approach)]
+        own = rows[(rows.task == row.task) & (rows.approach == row.approach) & (rows.evaluation == rows.evaluation.max())]
         lines.append(
-            f"| {task} | `{approach}` | {100 * at_end.success.mean():.0f} % ({low:.0f}–{high:.0f}) "
-            f"| {last['last']:.0f} % ({last['last_low']:.0f}–{last['last_high']:.0f}) "
-            f"| {world.noisy:.0f} % ({world.noisy_low:.0f}–{world.noisy_high:.0f}) | {100 * shares.early.mean():.0f} % "
-            f"| {at_end.robot_s.median() / 60:.0f} | {at_end.cpu_s.median():.1f} |"
+            f"| {row.task} | `{row.approach}` | {row.end:.0f} % ({row.end_low:.0f}–{row.end_high:.0f}) "
+            f"| {row.last:.0f} % ({row.last_low:.0f}–{row.last_high:.0f}) "
+            f"| {world.noisy:.0f} % ({world.noisy_low:.0f}–{world.noisy_high:.0f}) | {row.early:.0f} % "
+            f"| {own.robot_s.median() / 60:.0f} | {row.cpu_s:.1f} |"
         )
     return lines
 

@@ -313,11 +313,13 @@ def _without_shifts(predictor: Predictor, given: Model, state: _State) -> _State
     Beside any other free answer to past commands, without those that earn nothing in a model without terms, the least first: a
     late command and a clock that is early by as much make up for its steps together.
     """
-    contained = any(term.signal == RESPONSE for term in state.terms)
+    if any(term.signal == RESPONSE for term in state.terms):
+        for name in [shift for shift in SHIFTS if shift in state.names]:
+            state = state.without(predictor, name, fit_without(state.problem, state.fit, name))
     while any(term.signal in PAST for term in state.terms) and not {*SHIFTS}.isdisjoint(state.names):
         worth = {name: gain for name, gain in _alone(predictor, given, state).items() if name in SHIFTS}
         least = min(worth, key=lambda name: worth[name])
-        if not contained and worth[least] > MIN_GAIN * float(state.fit.held_out.mean()):
+        if worth[least] > MIN_GAIN * float(state.fit.held_out.mean()):
             break
         state = state.without(predictor, least, fit_without(state.problem, state.fit, least))
     return state
