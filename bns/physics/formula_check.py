@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import math
 import operator
+import threading
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -16,6 +17,8 @@ LARGEST = 1e12
 """The largest number, also of those that follow from others."""
 AGO, LONGEST_AGO_S = "ago", 60.0
 """The function of a wheel's past speeds, and how far back it reaches: its two arguments are numbers."""
+_PARSING = threading.RLock()
+"""Python's parser counts its levels for all threads together (CPython 106905): one at a time, or it fails at random."""
 _ARGUMENTS: Mapping[str, int] = {"min": 2, "max": 2, AGO: 2}
 _OPERATORS: Mapping[type[ast.AST], Callable[..., float]] = {
     ast.Add: operator.add,
@@ -47,7 +50,8 @@ def checked_formula(where: str, term: str, functions: Iterable[str]) -> ast.Expr
             f"{where} is {str(term)[:40]!r}; it must be a text of 1 to {LONGEST} characters: k * v * abs(w)."
         )
     try:
-        tree = ast.parse(term.strip(), mode="eval")
+        with _PARSING:
+            tree = ast.parse(term.strip(), mode="eval")
     except (SyntaxError, ValueError, MemoryError, RecursionError) as fault:
         raise ModelError(f"{where}: {_short(term)} is no formula: {fault}. Write it as in k * v * abs(w).") from fault
     pieces = sum(not isinstance(node, ast.Load) for node in ast.walk(tree))

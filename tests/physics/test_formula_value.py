@@ -1,6 +1,8 @@
 """What a formula's value is with parts of it kept from the call before: the same as without, to the last bit."""
 
+import gc
 import pickle
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -101,3 +103,30 @@ def test_a_term_is_pickled_as_its_text(kept):
     wanted = term.value_of_numbers(values)
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(term)).value_of_numbers(values), wanted)
 
+
+
+class _Waits:
+    """Garbage that lets other threads run while it is collected."""
+
+    def __init__(self):
+        self.itself = self
+
+    def __del__(self):
+        time.sleep(1e-4)
+
+
+def test_threads_may_make_formulas_at_the_same_time():
+    """Python's parser fails in one thread when another goes on within its call, as while garbage is collected."""
+    terms = [" + ".join(f"k{i} * abs(v) * (w + {i + n})" for i in range(20)) for n in range(40)]
+
+    def made(term):
+        _Waits()
+        return Compiled("sum", term).names
+
+    before = gc.get_threshold()
+    gc.set_threshold(50, 5, 5)
+    try:
+        with ThreadPoolExecutor(4) as pool:
+            assert all(len(names) == 22 for names in pool.map(made, terms * 4))
+    finally:
+        gc.set_threshold(*before)
