@@ -215,6 +215,12 @@ class Problem:
             reduced = self._jacobian(at, free, wide=rough)
         return self._concluded(at.model, free, at.whitened, reduced.jacobian)
 
+    def fitted_at(self, model: Model) -> Fit:
+        """The fit of which these are the numbers, whatever their loss."""
+        at, free = self._point(model), self.free(model)
+        reduced = self._jacobian(at, free, wide=self.predictor.luck is not None)
+        return self._concluded(model, free, at.whitened, reduced.jacobian)
+
     def _descended(
         self, at: _Point, free: Sequence[FreeParameter], nearby: Mapping[FreeParameter, Array] | None, most: int
     ) -> tuple[_Point, ReducedJacobian, bool]:

@@ -13,6 +13,7 @@ from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.jagged import with_jagged
 from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.estimate.profiles import with_simulated_profiles
 from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.parallel import each
 from bns.diagnose.predict.base import Predictor
@@ -82,7 +83,8 @@ def fit_set(
         other = problem.fit(known)
         if other.loss < fit.loss - BETTER:
             problem, fit = _settled(predictor, problem, other)
-    return problem, with_jagged(problem, fit), tuple(effect.name for effect in order)
+    fit = with_simulated_profiles(problem, with_jagged(problem, fit))
+    return problem, fit, tuple(effect.name for effect in order)
 
 
 def _begun_again(problem: Problem, fit: Fit, effects: Sequence[Effect]) -> Fit:

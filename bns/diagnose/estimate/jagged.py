@@ -49,7 +49,7 @@ def _hull(one: tuple[float, float], other: tuple[float, float]) -> tuple[float, 
 
 def _at(problem: Problem, fit: Fit, j: int, value: float) -> Fit:
     """The fit with that number at a value, and the others where they are best beside it."""
-    moved = problem.fit(moved_by(fit.model, fit.free, (value - fit.values[j]) * _followed(problem, fit, j)), rounds=0)
+    moved = problem.fit(moved_by(fit.model, fit.free, (value - fit.values[j]) * followed(problem, fit, j)), rounds=0)
     stepped = problem.fit(moved_by(moved.model, moved.free, _best_of_others(problem, moved, j)), rounds=0)
     return min((moved, stepped), key=lambda one: one.loss)
 
@@ -63,7 +63,7 @@ def _best_of_others(problem: Problem, fit: Fit, j: int) -> Array:
     return out
 
 
-def _followed(problem: Problem, fit: Fit, j: int) -> Array:
+def followed(problem: Problem, fit: Fit, j: int) -> Array:
     """By how much every number changes with a change of 1 of number j, (p,), the others following as least squares asks."""
     curvature = problem.normal_equations(fit.jacobian, fit.whitened).curvatures.sum(axis=0)
     others = np.arange(len(fit.free)) != j
@@ -76,7 +76,7 @@ def _followed(problem: Problem, fit: Fit, j: int) -> Array:
 def _searched(problem: Problem, fit: Fit, j: int) -> tuple[float, tuple[float, float]]:
     """The best value of a number along its profile, and its 95 % interval."""
     p = fit.free[j].parameter
-    ways = _followed(problem, fit, j), np.eye(len(fit.free))[j]  # a slope that spans a step leads the others astray
+    ways = followed(problem, fit, j), np.eye(len(fit.free))[j]  # a slope that spans a step leads the others astray
     middle = float(fit.values[j])
     reach = 3.0 * max(fit.se(j), abs(increment(fit.free[j], middle)) / 10.0)
     value, low, high = middle, middle, middle

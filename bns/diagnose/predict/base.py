@@ -52,10 +52,10 @@ class Predictor(Protocol):
     def steps(self, model: Model) -> Steps:
         """What the model predicts between successive frames."""
 
-    def anchor(self, model: Model) -> bool:
+    def anchor(self, model: Model, alone: bool = False) -> bool:
         """Models near this one are asked for next: what is worked out roughly is worked out well here.
 
-        Returns whether `steps` may say something else now.
+        ``alone``: only this very one is. Returns whether `steps` may say something else now.
         """
 
     @property

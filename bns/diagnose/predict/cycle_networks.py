@@ -62,7 +62,7 @@ class CyclePredictor:
         added[self.tracks.is_first] = 0.0
         return Steps(self._networks + added, np.zeros((len(added), 2)))
 
-    def anchor(self, model: Model) -> bool:
+    def anchor(self, model: Model, alone: bool = False) -> bool:
         """Every answer is exact."""
         return False
 

@@ -141,9 +141,9 @@ class JointedPredictor:
     def _frames_of(self, chosen: NDArray[np.int64]) -> NDArray[np.int64]:
         return np.flatnonzero(np.isin(self._stretches.stretch, chosen))
 
-    def anchor(self, model: Model) -> bool:
+    def anchor(self, model: Model, alone: bool = False) -> bool:
         """Simulate this model itself: later answers nearby start from it."""
-        return self._responses.anchor(model)
+        return self._responses.anchor(model, alone)
 
     def steps(self, model: Model) -> Steps:
         """What the body does from frame to frame, and how far the distances of its points are off."""

@@ -81,14 +81,14 @@ class Responses:
                     out += self._curve(number, there) - self._curve(number, here)
             return out
 
-    def anchor(self, model: Model) -> bool:
+    def anchor(self, model: Model, alone: bool = False) -> bool:
         """Simulate this model itself, unless one was that is hardly another, and its numbers' curves close to it.
 
-        Returns whether what is answered near it may have changed.
+        ``alone``: not the curves. Returns whether what is answered near it may have changed.
         """
         with self._lock:
             wanted = self._values(model)
-            refined = [self._refined(number, value) for number, value in wanted.items()]
+            refined = [] if alone else [self._refined(number, value) for number, value in wanted.items()]
             if min(self._distance(a.values, wanted) for a in self._anchors) <= _NEAR:
                 return any(refined)
             self._anchors.append(_Anchor(wanted, self._whole(model)))

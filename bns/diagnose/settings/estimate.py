@@ -103,6 +103,18 @@ class Estimate:
         7, "values", "Number of values tried on each side: with one every fiftieth of the range, valleys as narrow are seen."
     )
     look_rounds: int = setting(3, "rounds", f"From a lower place the fit begins again, at most this often; {BY_HAND}.")
+    profile_step: float = setting(
+        0.04,
+        "1",
+        "Distance of the values at which a body is simulated at last, to see where a number is best, as a fraction of the "
+        f"plausible range (of a factor by ratio); at least one standard error; {BY_HAND}.",
+    )
+    profile_points: int = setting(
+        5, "values", "The parabola goes through the losses at this many values about the least: two on either side of it."
+    )
+    profile_farthest: int = setting(
+        7, "steps", f"Values are added beyond an end beside which the loss is least, up to this many steps away; {BY_HAND}."
+    )
     wide_step: float = setting(
         0.15,
         "1",
