@@ -22,11 +22,11 @@ def share(value, other=BEST):
 class Body:
     """A problem whose losses are only known where the body was simulated: a bowl for every trial, with ripples."""
 
-    def __init__(self, rough=0.0, own=0.02, flat=False):
+    def __init__(self, rough=0.0, own=0.02, flat=False, worse=False):
         rng = np.random.default_rng(0)
         self.best, self.phase = rng.normal(0, own, TRIALS), rng.uniform(0, 2 * np.pi, TRIALS)
         self.best -= self.best.mean()
-        self.rough, self.flat, self.simulated, self.alone = rough, flat, {}, 0
+        self.rough, self.flat, self.worse, self.simulated, self.alone = rough, flat, worse, {}, 0
         self.predictor = SimpleNamespace(luck=object(), anchor=self.anchor, steps=lambda model: model)
 
     def anchor(self, model, alone=False):
@@ -48,15 +48,14 @@ class Body:
         return SimpleNamespace(curvatures=np.ones((TRIALS, 1, 1)), gradients=np.zeros((TRIALS, 1)))
 
     def fitted_at(self, model):
-        return fit_at(STIFFNESS.of(model))
+        value = STIFFNESS.of(model)
+        return fit_at(value, loss=1e3 if self.worse else share(value) ** 2)
 
 
-def fit_at(value, se=1e-3):
-    zeros = np.zeros((TRIALS, 3))
+def fit_at(value, se=1e-3, loss=1.0):
+    zeros, losses = np.zeros((TRIALS, 3)), np.full(TRIALS, loss)
     model = SNAKE.with_effect("compliance", stiffness=value)
-    return Fit(
-        model, (STIFFNESS,), np.array([value]), np.array([[se**2]]), zeros[:, 0], zeros[:, 0], zeros, np.zeros((TRIALS, 3, 1))
-    )
+    return Fit(model, (STIFFNESS,), np.array([value]), np.array([[se**2]]), losses, losses, zeros, np.zeros((TRIALS, 3, 1)))
 
 
 @pytest.fixture(autouse=True)
@@ -94,6 +93,13 @@ def test_a_number_stays_where_nothing_tells_it():
     found = with_simulated_profiles(body, fit_at(0.74))
     assert found.values[0] == 0.74
     assert not found.spans
+
+
+def test_a_number_stays_where_the_loss_is_no_lower_at_the_parabolas_lowest_point():
+    found = with_simulated_profiles(Body(worse=True), fit_at(0.74))
+    assert found.values[0] == 0.74
+    low, high = found.interval(0)
+    assert low < 0.74 < high
 
 
 def test_only_bodies_are_simulated_again():

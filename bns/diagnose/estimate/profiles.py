@@ -32,7 +32,8 @@ _FARTHEST = DEFAULTS.estimate.profile_farthest
 def with_simulated_profiles(problem: Problem, fit: Fit) -> Fit:
     """The fit of a body with its numbers at the lowest points of their profiles, and with intervals from these.
 
-    The same fit for every other robot, and numbers whose profile has no lowest point stay as they are.
+    The same fit for every other robot. Numbers whose profile has no lowest point stay as they are, and so do those with which
+    the simulated loss is no lower there.
     """
     if problem.predictor.luck is None:
         return fit
@@ -43,16 +44,19 @@ def with_simulated_profiles(problem: Problem, fit: Fit) -> Fit:
         if simulated and np.isfinite(number.parameter.plausible).all():
             found = _searched(problem, fit, j)
             if found is not None:
-                value, spans[j] = found
+                value, half = found
                 way = (value - fit.values[j]) * followed(problem, fit, j)
                 moved = moved_by(fit.model, fit.free, way)
                 problem.predictor.anchor(moved)
-                fit = problem.fitted_at(moved)
+                there = problem.fitted_at(moved)
+                fit = there if there.loss < fit.loss else fit
+                at = float(fit.values[j])
+                spans[j] = number.parameter.beside(at, -half), number.parameter.beside(at, half)
     return replace(fit, spans=spans)
 
 
-def _searched(problem: Problem, fit: Fit, j: int) -> tuple[float, tuple[float, float]] | None:
-    """The lowest point of a number's profile and its 95 % interval; None where there is no lowest point within reach."""
+def _searched(problem: Problem, fit: Fit, j: int) -> tuple[float, float] | None:
+    """The lowest point of a number's profile, and half of its 95 % interval as a share of the plausible range; None: no such."""
     number, value = fit.free[j], float(fit.values[j])
     p, way = number.parameter, followed(problem, fit, j)
     step = max(_STEP, p.apart(p.beside(value, _STEP), value) * fit.se(j) / max(abs(p.beside(value, _STEP) - value), 1e-30))
@@ -77,8 +81,7 @@ def _searched(problem: Problem, fit: Fit, j: int) -> tuple[float, tuple[float, f
     share, se = lowest
     middle = p.beside(value, share)
     freedom = max(len(fit.losses) - len(fit.free), 1)
-    half = float(stdtrit(freedom, 0.975)) * max(se, _share_of(number, middle, fit.se(j)))
-    return middle, (p.beside(middle, -half), p.beside(middle, half))
+    return middle, float(stdtrit(freedom, 0.975)) * max(se, _share_of(number, middle, fit.se(j)))
 
 
 def _share_of(number: FreeParameter, value: float, change: float) -> float:
