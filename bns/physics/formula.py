@@ -139,6 +139,11 @@ def _is_linear(code: Compiled, numbers: Sequence[str]) -> bool:
     return True
 
 
+def may_be_number(name: str) -> bool:
+    """Whether a name that is no variable would be taken for a number to fit."""
+    return _NUMBER.fullmatch(name) is not None
+
+
 def value_of(term: str, names: Mapping[str, Any]) -> Array:
     """The value of a term for given numbers and arrays, one for each of its names; ModelError if it is no formula."""
     return np.asarray(_parsed("term", term).value(names), dtype=np.float64)
@@ -157,7 +162,7 @@ def _sorted(name: str, names: set[str], columns: set[str], numbers: set[str] | N
             unknown.append(one)
         elif one in columns or numbers is not None:
             logged.append(one)
-        elif _NUMBER.fullmatch(one):
+        elif may_be_number(one):
             unknown.append(one)
         else:
             known = unknown_name("name", one, [*VARIABLES, *columns])

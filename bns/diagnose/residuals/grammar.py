@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from keyword import iskeyword
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,10 @@ from bns.diagnose.residuals.along_variables import with_columns
 from bns.diagnose.residuals.symbolic import PROBE
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect
-from bns.physics.formula import LEFT, RIGHT, SHARE, WHEELS, formula_effect
+from bns.physics.effects import all_effects
+from bns.physics.formula import LEFT, OF_A_WHEEL, RIGHT, SHARE, VARIABLES, WHEELS, formula_effect, may_be_number
+from bns.physics.formula_check import AGO
+from bns.physics.formula_value import FUNCTIONS
 
 RESPONSE = "response of each wheel in time"
 SHIFTS = ("clock-offset", "command-delay")
@@ -53,6 +57,8 @@ TRAVEL = "direction of travel"
 """Where the robot drives to: its heading, or the opposite where it reverses."""
 PULL = "heading, in proportion to the speed"
 """A turn for each metre driven, whichever way: a magnet, or a nap that guides the wheels."""
+LOGGED, LOGGED_OFFSET = "the logged ", ", whatever the speed"
+"""Signals that are a further column of the log, by its name; as a factor of a velocity, and as an addition to it."""
 STRAIGHT = "straight lines"
 """What happens only while both wheels are told the same, such as a heading that is held by a gyro."""
 CHANCE = DEFAULTS.residuals.chance
@@ -71,6 +77,7 @@ SURFACE_DRIVEN = DEFAULTS.residuals.surface_driven
 SWING_KNOTS = DEFAULTS.residuals.swing_knots
 STRAIGHT_AT, STRAIGHT_WITHIN = DEFAULTS.residuals.straight_within
 STRAIGHT_SHARE = DEFAULTS.residuals.straight_share
+COLUMN_KNOTS = DEFAULTS.residuals.column_knots
 FLOOR_SIDE = DEFAULTS.residuals.floor_side
 _SMALL = 1e-4
 
@@ -116,6 +123,7 @@ def families(predictor: Predictor, wheelbase_m: float, response: bool = True) ->
         Family("speed and turn", "s", ("v * w * abs(w)", "v * w * abs(v)", "w")),
         *_surfaces(seen, predictor.grid.step_s, wheelbase_m),
         Family("side of the turn", "v", ("v * max(w, 0)", "v * min(w, 0)", "moving * max(w, 0)", "moving * min(w, 0)")),
+        *_of_columns(predictor),
     ]
     if not predictor.tracks.relative:
         found += [f for f in _of_tracks(predictor, seen, wheelbase_m) if response or f.signal != RESPONSE]
@@ -230,6 +238,35 @@ def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float)
     yield Family(PLACE, "s", tuple(askew))
 
 
+def formula_columns(predictor: Predictor) -> list[str]:
+    """The log's further columns that vary, as far as a formula can name them and no listed effect has them for itself."""
+    own = {p.column for effect in all_effects().values() for p in effect.parameters}
+    taken = {*VARIABLES, *OF_A_WHEEL, *FUNCTIONS, AGO, *own, "session_s"}
+    able = [c for c in predictor.tracks.extra if c.isidentifier() and not iskeyword(c) and not may_be_number(c)]
+    return [c for c in able if c not in taken and np.ptp(_known(predictor, c)) > 0.0]
+
+
+def _known(predictor: Predictor, column: str) -> Array:
+    values = predictor.tracks.extra[column]
+    known: Array = values[np.isfinite(values)]
+    return known if len(known) else np.zeros(1)
+
+
+def _of_columns(predictor: Predictor) -> Iterator[Family]:
+    """What follows a further column of the log: in proportion to it, or by a curve; as a factor or as an addition."""
+    for c in formula_columns(predictor):
+        knots = np.unique(np.quantile(np.unique(_known(predictor, c)), COLUMN_KNOTS))
+        if len(knots) < 2:
+            continue
+        hats = _hats(c, [float(k) for k in knots])
+        for on, now in (("v", "v * "), ("w", "w * "), (SHARE, ""), (LEFT, "u * "), (RIGHT, "u * ")):
+            yield Family(LOGGED + c, on, (f"{now}{c}",))
+            if len(knots) > 2:
+                yield Family(LOGGED + c, on, tuple(now + hat for hat in hats))
+        for on in ("v", "w"):
+            yield Family(LOGGED + c + LOGGED_OFFSET, on, (f"moving * {c}",))
+
+
 def _straight(seen: dict[str, Array], wheelbase_m: float) -> Iterator[Family]:
     """A turn on straight lines alone, at a rate of its own and one in proportion to the speed; of logs that have both."""
     left, right = seen["left_m_s"], seen["right_m_s"]
@@ -263,13 +300,13 @@ def significant(earned: Sequence[Earned]) -> list[Earned]:
 
 
 def simpler_first(found: Sequence[Earned], usual: float) -> list[Earned]:
-    """The same, but the odd curve of a wheel's speed comes before the curves of each direction unless these predict better.
+    """The same, but of two families of which one contains the other the smaller comes first, unless the larger predicts better.
 
-    For certain, and by more than `LEAST` of ``usual``, the loss of a trial: the larger family contains what the odd one can draw.
+    For certain, and by more than `LEAST` of ``usual``, the loss of a trial.
     """
     out = list(found)
-    for larger in [e for e in found if e.family.signal == BY_DIRECTION.get(e.family.on)]:
-        odd = next((e for e in found if (e.family.signal, e.family.on) == (OF_SPEED[larger.family.on], larger.family.on)), None)
+    for larger in found:
+        odd = _smaller(larger, found)
         if odd is None:
             continue
         gain, se = paired_elpd_diff(odd.losses, larger.losses)
@@ -277,6 +314,16 @@ def simpler_first(found: Sequence[Earned], usual: float) -> list[Earned]:
             out.remove(odd)
             out.insert(min(out.index(larger), found.index(odd)), odd)
     return out
+
+
+def _smaller(larger: Earned, found: Sequence[Earned]) -> Earned | None:
+    """The family that a larger one contains, with fewer numbers: an odd curve of a wheel's speed, a straight line of a column."""
+    of, on = larger.family, larger.family.on
+    if of.signal == BY_DIRECTION.get(on):
+        return next((e for e in found if (e.family.signal, e.family.on) == (OF_SPEED[on], on)), None)
+    if of.signal.startswith(LOGGED) and len(of.functions) > 1:
+        return next((e for e in found if (e.family.signal, e.family.on, len(e.family.functions)) == (of.signal, on, 1)), None)
+    return None
 
 
 def certain(comparison: PairedComparison, share: float) -> bool:
@@ -316,7 +363,7 @@ def columns_of(problem: Problem, fit: Fit, family: Family) -> Array:
     """Change of the whitened innovations for each number of a family, (frames, 3, functions)."""
     out = np.empty((*fit.whitened.shape, len(family.functions)))
     for i, function in enumerate(family.functions):
-        effect = formula_effect(PROBE, f"k * {function}", family.on)
+        effect = formula_effect(PROBE, f"k * {function}", family.on, problem.predictor.tracks.extra)
         out[..., i] = _column(problem, fit, effect, (_SMALL,))
     return out
 

@@ -185,7 +185,7 @@ def fitted(
     start: Mapping[str, float] | None = None,
 ) -> Formula | None:
     """The model with a term whose numbers begin at ``start`` (0), all numbers fitted; None where it cannot be calculated."""
-    effect, start = formula_effect(name, term, on), start or {}
+    effect, start = formula_effect(name, term, on, problem.predictor.tracks.extra), start or {}
     model = _written(fit.model.with_active(effect, _within(effect, start)), term, on, name)
     try:
         added = problem.fit(model)

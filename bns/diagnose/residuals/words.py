@@ -14,6 +14,8 @@ from bns.diagnose.residuals.grammar import (
     BY_DIRECTION,
     CHANGES,
     CHANGES_ALONE,
+    LOGGED,
+    LOGGED_OFFSET,
     PLACE,
     PULL,
     RESPONSE,
@@ -53,6 +55,8 @@ def in_words(term: Formula, predictor: Predictor) -> str:
             return f"the robot slides to the {'right' if v['k'] >= 0 else 'left'} by {abs(v['k']):.2%} of its speed {there}"
         motion = {"v": " in forward motion", "w": " in its turns"}.get(term.on, "")
         return f"{_slower(-v['k'])}{motion} {there}"
+    if term.signal.startswith(LOGGED):
+        return _column(term, predictor)
     said = _SAID.get((term.signal, term.on))
     if said:
         return said(term, predictor)
@@ -167,6 +171,22 @@ def _travel(term: Formula, _: Predictor) -> str:
     share = _curve(term, "heading", grid, v=1.0)
     low, high = (int(i) for i in (share.argmin(), share.argmax()))
     return ", ".join(f"{_slower(-share[i])} when it travels towards {np.degrees(grid[i]):.0f}°" for i in (low, high))
+
+
+_WHOSE = {"v": "forward motion", "w": "turning", SHARE: "motion", LEFT: "left wheel", RIGHT: "right wheel"}
+
+
+def _column(term: Formula, predictor: Predictor) -> str:
+    """Of what follows a further column of the log: how much at a low value of it and at a high one."""
+    name, values = term.signal.removeprefix(LOGGED).removesuffix(LOGGED_OFFSET), predictor.tracks.extra
+    low, high = np.nanquantile(values[name], _ENDS)
+    change = _curve(term, name, np.array([low, high]), v=1.0, w=1.0, u=1.0, moving=1.0)
+    if term.signal.endswith(LOGGED_OFFSET):
+        said, unit = (np.degrees(change), "°/s") if term.on == "w" else (1e3 * change, "mm/s")
+        at = [f"{one:+.2g} {unit} at {where:.3g}" for one, where in zip(said, (low, high), strict=True)]
+        return f"{VELOCITIES[term.on]} changes with {name} while the robot moves: {', '.join(at)}"
+    at = [f"{_slower(-one)} at {where:.3g}" for one, where in zip(change, (low, high), strict=True)]
+    return f"the robot's {_WHOSE[term.on]} follows {name}: {', '.join(at)}"
 
 
 def _straight(term: Formula, predictor: Predictor) -> str:

@@ -206,6 +206,12 @@ class Residuals(CommandTimes):
         "Knots of a curve along the difference between the direction of motion and that over the last half "
         "wheelbase of distance (1: reversed); the curve is zero at the first knot.",
     )
+    column_knots: tuple[float, ...] = setting(
+        (0.0, 0.5, 1.0),
+        "quantiles",
+        "Knots of a free curve along a further column of the log, as quantiles of the values that occur: beside a straight line "
+        f"one bend; {BY_HAND}.",
+    )
     straight_within: tuple[float, float] = setting(
         (0.001, 0.1),
         "of the sharpest turn",
