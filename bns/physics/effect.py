@@ -10,7 +10,7 @@ import numpy as np
 
 from bns.errors import ModelError, unknown_name
 from bns.physics.order import ORDER, OTHERS, place
-from bns.physics.signals import Wheels
+from bns.physics.signals import Array, Wheels
 
 STAGES = ("wheel", "body", "world", "clock", "measure")
 """In the order in which they act; `bns.physics.signals` says what each one passes on."""
@@ -46,6 +46,8 @@ class Parameter:
     """The plausible range and the start values grow with this power of the wheelbase: 1 for lengths and speeds."""
     floor_share: float = 0.0
     """Upper bound of a length, as a fraction of the diagonal of the area where the robot was seen; 0: no such bound."""
+    floor_axis: str = ""
+    """x or y: a place, plausible as far from the area where the robot was seen as that is long (its diagonal)."""
     trial_share: float = 0.0
     """Upper bound of a time, as a fraction of the longest trial; 0: no such bound."""
     reached: tuple[float, ...] = ()
@@ -86,8 +88,12 @@ class Parameter:
         moved = value * (high / low) ** share if by_ratio else value + share * (high - low)
         return float(np.clip(moved, self.low, self.high))
 
-    def within(self, diagonal_m: float) -> Parameter:
-        """The parameter, bounded to its `floor_share` of a floor with this diagonal."""
+    def within(self, low_m: Array, high_m: Array) -> Parameter:
+        """The parameter for a robot that was seen between these corners (x, y): its `floor_share`, its `floor_axis`."""
+        diagonal_m = float(np.hypot(*(high_m - low_m)))
+        if self.floor_axis:
+            axis = "xy".index(self.floor_axis)
+            return replace(self, plausible=(float(low_m[axis]) - diagonal_m, float(high_m[axis]) + diagonal_m))
         if not self.floor_share:
             return self
         high = max(self.floor_share * diagonal_m, 4.0 * self.low)
@@ -190,11 +196,11 @@ class Effect:
             starts=tuple(tuple(v * f for v, f in zip(start, factors, strict=True)) for start in self.starts),
         )
 
-    def within(self, diagonal_m: float) -> Effect:
-        """The effect with ranges for a floor with this diagonal, m."""
-        if not any(p.floor_share for p in self.parameters):
+    def within(self, low_m: Array, high_m: Array) -> Effect:
+        """The effect with ranges for a robot that was seen between these corners (x, y), m."""
+        if not any(p.floor_share or p.floor_axis for p in self.parameters):
             return self
-        return replace(self, parameters=tuple(p.within(diagonal_m) for p in self.parameters))
+        return replace(self, parameters=tuple(p.within(low_m, high_m) for p in self.parameters))
 
     def lasting(self, longest_s: float) -> Effect:
         """The effect with ranges and start values for trials of which the longest takes so long, s."""

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from bns.diagnose.data import tracking_noise as module
+from bns.diagnose.data.robust import robust_sd, trimmed_sd
 from bns.diagnose.data.tracking_noise import noise_at_rest, tracking_noise
+from bns.diagnose.settings import DEFAULTS
 
 NOISE = np.array([0.001, 0.001, 0.005])
 
@@ -86,3 +88,15 @@ def test_what_is_left_of_a_polynomial_is_what_least_squares_leave():
     for times, one, weights in zip(t_s, values, module._residual_makers(t_s, 2), strict=True):
         left = one - np.polyval(np.polyfit(times - 10.5, one, 2), times - 10.5)
         assert weights @ one == pytest.approx(left[3], abs=1e-9)
+
+
+def test_the_noise_is_known_from_fewer_numbers_than_the_median_needs_and_faults_hardly_count():
+    draws = np.random.default_rng(4).normal(size=(400, 200))
+    of = {sd: np.array([float(sd(one)) for one in draws]) for sd in (robust_sd, trimmed_sd)}
+    np.testing.assert_allclose([one.mean() for one in of.values()], 1.0, atol=0.01)
+    assert of[trimmed_sd].std() == pytest.approx(DEFAULTS.data.trimmed_sd_se / np.sqrt(200), rel=0.1)
+    assert of[robust_sd].std() > 1.4 * of[trimmed_sd].std()
+    faulty = draws.ravel() * np.where(np.arange(draws.size) % 33 == 0, 30.0, 1.0)
+    assert trimmed_sd(faulty) == pytest.approx(1.0, abs=0.01)
+    assert robust_sd(faulty) > 1.03
+    assert trimmed_sd(np.zeros(5)) == 0.0

@@ -85,7 +85,7 @@ def test_an_effect_of_a_user_has_a_place_and_words_without_saying_so():
 @every_effect
 @pytest.mark.parametrize("diagonal_m", [0.03, 0.3, 30.0])
 def test_on_a_floor_of_any_size_the_neutral_values_are_allowed(effect, diagonal_m):
-    fitting = effect.within(diagonal_m)
+    fitting = effect.within(np.zeros(2), diagonal_m * np.array([0.6, 0.8]))
     assert fitting.checked(fitting.neutral)
 
 

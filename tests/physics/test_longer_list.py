@@ -224,10 +224,10 @@ def test_ranges_grow_with_the_robot():
 
 
 def test_a_patch_covers_no_whole_floor():
-    patch = effect_named("floor-patch").within(1.5)
+    patch = effect_named("floor-patch").within(np.zeros(2), np.array([0.9, 1.2]))
     radius = patch.parameters[2]
     assert radius.high == radius.plausible[1] == pytest.approx(0.33 * 1.5)
-    assert effect_named("backlash").within(1.5) is effect_named("backlash")
+    assert effect_named("backlash").within(np.zeros(2), np.array([0.9, 1.2])) is effect_named("backlash")
 
 
 @pytest.mark.parametrize(("at_rest", "share"), [(0.0, 0.0), (0.25, 0.25), (1.0, 1.0)])
@@ -396,3 +396,9 @@ def test_a_battery_that_runs_flat_slows_both_wheels_with_the_session_and_with_ev
     kept = np.array([[1 - 0.01 - 0.05, 1 - 0.02 - 0.1]])
     np.testing.assert_allclose(slowed.left_m_s, speed * kept)
     np.testing.assert_allclose(slowed.right_m_s, 2 * speed * kept)
+
+
+def test_a_lens_has_its_centre_near_the_floor_that_it_shows():
+    lens = effect_named("lens-distortion").within(np.array([29.0, -2.0]), np.array([32.0, 2.0]))
+    assert [p.plausible for p in lens.parameters[1:]] == [(24.0, 37.0), (-7.0, 7.0)]
+    assert lens.parameters[0] == effect_named("lens-distortion").parameters[0]

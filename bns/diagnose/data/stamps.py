@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from bns.diagnose.data.tracking_noise import robust_sd
+from bns.diagnose.data.robust import robust_sd
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.settings import DEFAULTS
 

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from bns.diagnose.data.rests import settled, told_to_stand
-from bns.diagnose.data.robust import robust_sd
+from bns.diagnose.data.robust import trimmed_sd
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.settings import DEFAULTS
 
@@ -26,7 +26,7 @@ ORDER = DEFAULTS.data.parabola_order
 SLOWEST_HZ = DEFAULTS.data.parabola_slowest_hz
 AGREES = DEFAULTS.data.rest_agrees
 _AT_REST, _DRIVING, _BOTH = "at rest", "high frequency", "at rest, high frequency"
-_SE = DEFAULTS.data.robust_sd_se
+_SE = DEFAULTS.data.trimmed_sd_se
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def _about(t_s: Array, pose: Array, order: int) -> Array:
 
 def _pooled(parts: list[Array], basis: str) -> TrackingNoise:
     off = np.concatenate(parts)
-    return TrackingNoise(float(robust_sd(off[:, :2])), float(robust_sd(off[:, 2])), basis)
+    return TrackingNoise(trimmed_sd(off[:, :2]), trimmed_sd(off[:, 2]), basis)
 
 
 def _high_frequency(tracks: Tracks) -> TrackingNoise | None:

@@ -53,7 +53,7 @@ def fitting(effect: Effect, model: Model, tracks: Tracks | None) -> Effect:
     if tracks is None or not len(tracks.pose):
         return scaled
     low, high = np.quantile(tracks.pose[:, :2], [0.02, 0.98], axis=0)
-    within = scaled.within(float(np.hypot(*(high - low))))
+    within = scaled.within(low, high)
     return within if tracks.relative else within.lasting(float(tracks.own_s.max()))
 
 
