@@ -52,6 +52,7 @@ VALUES: dict[str, dict[str, float]] = {
     "heating": {"loss_per_m": 0.2, "cool_s": 60.0},
     "inertia-lag": {"tau_s": 0.6, "turn_ratio": 0.3},
     "lag-mismatch": {"tau_s": 0.4, "ratio": 3.0},
+    "affine-distortion": {"stretch": 0.15, "shear": 0.0},
     "lens-distortion": {"per_m2": 0.3, "x_m": 0.2, "y_m": 0.0},
     "marker-offset": {"forward_m": 0.04, "left_m": 0.03},
     "motor-lag": {"tau_s": 0.3},

@@ -74,6 +74,7 @@ ORDER = (
     "sensor-rotation",
     "tilted-camera",
     "lens-distortion",
+    "affine-distortion",
     "camera-scale",
     "camera-rotation",
     "compass-deviation",

@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 from tests.hidden_effects.cause import Body, Cause, Moment
 from tests.hidden_effects.listed_braking import BrakingLag, BrakingLimit, BrakingRamp, LagMismatch
 from tests.hidden_effects.listed_floor import (
+    AffineDistortion,
     CarpetDrift,
     CasterDrag,
     CasterSwing,
@@ -403,6 +404,7 @@ LISTED: dict[str, type[Cause]] = {
     "marker-offset": MarkerOffset,
     "tilted-camera": TiltedCamera,
     "lens-distortion": LensDistortion,
+    "affine-distortion": AffineDistortion,
     "camera-scale": CameraScale,
     "camera-rotation": CameraRotation,
     "compass-deviation": CompassDeviation,

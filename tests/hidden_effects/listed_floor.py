@@ -170,3 +170,18 @@ class LensDistortion(Picture):
         centre = np.array([self.x_m, self.y_m])
         radius = np.linalg.norm(places - centre, axis=-1, keepdims=True)
         return centre + (places - centre) * (1 + self.per_m2 * radius**2)
+
+
+@dataclass
+class AffineDistortion(Picture):
+    """Two stretches, each along its own axis: one along x and y, one along the diagonals."""
+
+    stretch: float
+    shear: float
+
+    def pictured(self, places: np.ndarray) -> np.ndarray:
+        longest = np.array([self.stretch, self.shear])
+        size, angle = np.linalg.norm(longest), np.arctan2(self.shear, self.stretch) / 2
+        axis = np.array([np.cos(angle), np.sin(angle)])
+        along = (places @ axis)[..., None] * axis
+        return places + size * (along - (places - along))
