@@ -286,3 +286,7 @@ def test_a_moment_that_begins_and_ends_where_it_is_predicted_says_how_far_the_tr
     assert within.in_words.endswith("°, but up to 17 mm from where it was predicted on the way")
     assert at_end.strayed_m == pytest.approx(0.017, abs=1e-4)
     assert "on the way" not in at_end.in_words
+    opposite = replace(within, moved_m=0.056, predicted_m=0.056, ended_m=0.11)
+    assert opposite.in_words.endswith("°, in another direction: it ended 110 mm from there")
+    shorter = replace(within, moved_m=0.03, predicted_m=0.056, ended_m=0.03)
+    assert shorter.in_words.endswith("°")

@@ -57,6 +57,8 @@ class Outlier:
     predicted_rad: float
     strayed_m: float = 0.0
     """How far it came from where it was predicted, at any frame of the window."""
+    ended_m: float = 0.0
+    """How far it was from there at the end of the window."""
     left_m: float = 0.0
     right_m: float = 0.0
     """How much farther each wheel came than predicted, in the direction in which it was predicted to turn; less is negative."""
@@ -79,6 +81,8 @@ class Outlier:
         moved, expected = f"{1e3 * self.moved_m:.0f} mm", f"{1e3 * self.predicted_m:.0f} mm"
         alike = (moved, turned) == (expected, predicted)
         between = f", but up to {1e3 * self.strayed_m:.0f} mm from where it was predicted on the way" if alike else ""
+        if self.ended_m**2 > 2.0 * (self.moved_m - self.predicted_m) ** 2:  # most of it is a difference of direction
+            between = f", in another direction: it ended {1e3 * self.ended_m:.0f} mm from there"
         return (
             f"at {self.t_s:.2f} s, near ({self.x_m:.2f}, {self.y_m:.2f}) m: moved {moved} and turned {turned}° in "
             f"{self.lasted_s:.2f} s, predicted {expected} and {predicted}°{between}"
@@ -137,7 +141,8 @@ def moment_at(problem: Problem, fit: Fit, start: int, size: float) -> Outlier:
         float(tracks.own_s[start]),
         size,
         float(tracks.own_s[end] - tracks.own_s[begin]),
-        *(float(v) for v in (x, y, way, turned, np.hypot(*driven[:2]), driven[2], np.hypot(*strayed.T[:2]).max())),
+        *(float(v) for v in (x, y, way, turned, np.hypot(*driven[:2]), driven[2])),
+        *(float(v) for v in (np.hypot(*strayed.T[:2]).max(), np.hypot(*off[:2]))),
         *wheels,
     )
 
