@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
@@ -153,6 +153,8 @@ def added(
         ready.predictor, ready.model, effects, ready.measured, per_trial, memory, told
     )
     told(1.0, "done")
+    if ready.fitted_here:
+        extended = replace(extended, warnings=(ready.fitted_here, *extended.warnings))
     return AddResult(ready, extended)
 
 

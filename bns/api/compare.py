@@ -38,6 +38,7 @@ class CompareResult(Shown):
 
     ``comparison`` holds the complete result. ``causes`` says why the networks of a run are wrong; it is None for a model, and
     for networks without their training patterns. ``used`` says how much of the measurements is compared; "" for all.
+    ``notes``: what to beware of.
     """
 
     log: Measurements
@@ -46,6 +47,7 @@ class CompareResult(Shown):
     causes: NetworkErrors | None = None
     of_networks: bool = False
     used: str = ""
+    notes: tuple[str, ...] = ()
 
     @property
     def errors(self) -> pd.DataFrame:
@@ -70,6 +72,8 @@ class CompareResult(Shown):
     def summary(self) -> str:
         """Errors at every horizon, what explains them, the worst moments; of networks also why they are wrong."""
         text = comparison_text(self.comparison)
+        if self.notes:
+            text = "\n".join([text, "", "notes:", *(f"  - {note}" for note in self.notes)])
         return text if self.causes is None else f"{text}\n\n{network_errors_text(self.causes)}"
 
     def to_json(self) -> dict[str, Any]:
@@ -77,7 +81,7 @@ class CompareResult(Shown):
         causes = {} if self.causes is None else {"causes": self.causes.as_json()}
         findings = [vars(each) for each in self.log.measured.findings]
         made_of = {"provenance": provenance(self.model, self.log.sha256)}
-        return {**self.comparison.as_json(), **causes, "findings": findings, **made_of}
+        return {**self.comparison.as_json(), **causes, "findings": findings, "notes": list(self.notes), **made_of}
 
     def plot(self, ax: Axes | None = None, variable: str | None = None, direction: str | None = None) -> Axes:
         """Mean error a second along one variable (by default the one that explains most), with its 95 % band.
@@ -133,4 +137,5 @@ def compare(
     of_networks = isinstance(ready.predictor, NetworkPredictor)
     meter.done()
     used = ready.thinned if isinstance(ready, Prepared) else ""
-    return CompareResult(ready.log, ready.model, result, causes, of_networks, used)
+    notes = (ready.fitted_here,) if isinstance(ready, Prepared) and ready.fitted_here else ()
+    return CompareResult(ready.log, ready.model, result, causes, of_networks, used, notes)

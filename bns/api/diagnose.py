@@ -291,4 +291,6 @@ def _found(
 
     found = work() if own else remembered("diagnose", ready, sorted(barred), work, Diagnosis, fresh, settings)
     meter.done()
+    if ready.fitted_here:
+        found = replace(found, notes=(ready.fitted_here, *found.notes))
     return DiagnoseResult(ready, found, settings)

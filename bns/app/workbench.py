@@ -88,7 +88,9 @@ class Workbench:
     @property
     def thinned(self) -> str:
         """How many of the poses are used, in words; "" for all."""
-        return "" if isinstance(self.ready, PreparedNetworks) else self.ready.thinned
+        if isinstance(self.ready, PreparedNetworks):
+            return ""
+        return " ".join(filter(None, (self.ready.thinned, self.ready.fitted_here)))
 
     @property
     def horizons(self) -> tuple[str, ...]:

@@ -212,6 +212,13 @@ def documented(fit: Fit, before: Model, measured: Measured, errors: PairedErrors
     return replace(fit.model, effects=effects, provenance=provenance)
 
 
+def fitted_to(model: Model, digest: str) -> bool:
+    """Whether numbers of a model came of the measurements with this digest, as `documented` says where they come from."""
+    if not digest:
+        return False
+    return model.provenance.get("data_sha256") == digest or any(f"({digest})" in active.reason for active in model.effects)
+
+
 def _with_interval(fit: Fit, active: ActiveEffect, reason: str) -> ActiveEffect:
     intervals = {f.parameter.name: fit.interval(i) for i, f in enumerate(fit.free) if f.effect == active.effect.name}
     if active.trial_values:

@@ -8,6 +8,7 @@ from pathlib import Path
 from bns.api.common.arguments import named_model
 from bns.api.measurements import Log, Measurements, as_measurements
 from bns.api.model import Given, Model, as_model
+from bns.diagnose.adding import fitted_to
 from bns.diagnose.data.bodies.cycles import CycleTracks, marker_noise_m
 from bns.diagnose.data.bodies.joints import SET, JointTracks, check_names, check_scales
 from bns.diagnose.data.bodies.stretches import stretches_of_cycles, stretches_of_joints
@@ -39,6 +40,16 @@ class Prepared:
     measured: Measured
     predictor: Predictor
     model: Model
+
+    @property
+    def fitted_here(self) -> str:
+        """That the model was fitted to these very measurements, in words; "" where it was not."""
+        if not fitted_to(self.model, self.measured.digest):
+            return ""
+        return (
+            f"The model as given was fitted to these very measurements ({self.log.name}): its errors are those of trials that it "
+            "knows, not of trials held out, and lower than on new ones."
+        )
 
     @property
     def thinned(self) -> str:
