@@ -214,8 +214,6 @@ def documented(fit: Fit, before: Model, measured: Measured, errors: PairedErrors
 
 def fitted_to(model: Model, digest: str) -> bool:
     """Whether numbers of a model came of the measurements with this digest, as `documented` says where they come from."""
-    if not digest:
-        return False
     return model.provenance.get("data_sha256") == digest or any(f"({digest})" in active.reason for active in model.effects)
 
 

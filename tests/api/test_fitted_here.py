@@ -53,4 +53,3 @@ def test_a_model_whose_numbers_were_all_fitted_again_no_longer_knows_the_first_l
 
 def test_a_model_of_a_drawing_was_fitted_to_nothing(logs):
     assert not bns.compare(logs[0], NOMINAL).notes
-    assert not fitted_to(NOMINAL, "")
