@@ -13,8 +13,17 @@ from bns.diagnose.data.checks import checked
 from bns.diagnose.data.tracker_faults import jumps, without_faults
 from bns.diagnose.data.tracking_noise import TrackingNoise, _about, noise_at_rest, tracking_noise
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.predict.paired_errors import FEWEST_TRIALS, Change, _Draws, paired_errors
+from bns.diagnose.predict.paired_errors import (
+    FEWEST_TRIALS,
+    Change,
+    HorizonErrors,
+    ModelError,
+    PairedErrors,
+    _Draws,
+    paired_errors,
+)
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.report.text import error_lines
 from bns.measurements import write_measurements
 from bns.physics.model import Model
 from tests.diagnose.worlds import NOMINAL, hidden, measured
@@ -232,3 +241,23 @@ def test_medians_of_samples_are_those_of_all_their_windows():
     draws = _Draws.over(np.bincount(of_trial))
     expected = [np.quantile(np.repeat(values, n[of_trial].astype(int)), 0.5, method="inverted_cdf") for n in draws.drawn[:50]]
     assert draws.medians(values, of_trial)[:50] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("before_m", "median_m", "change", "shown"),
+    [
+        (0.237754, 0.17009, (-0.21777, -0.25369, -0.18314), ("  237.75 (170.09)  ", "  -217.77 (-253.69 to -183.14)")),
+        (1.5002, 0.71873, (-1.4541, -1.95682, -0.89832), ("    1500 (  719)  ", "  -1454 (-1957 to -898)")),
+        (99.9999, 99.9999, (-99.9999, -99.9999, -99.9999), ("  100000 (100000)  ", "  -100000 (-100000 to -100000)")),
+    ],
+)
+def test_large_errors_keep_the_columns_of_the_table_apart(before_m, median_m, change, shown):
+    models = (
+        ModelError("as given", before_m, before_m, before_m, median_m, 0.1),
+        ModelError("with the effects", 0.0461, 0.0461, 0.0461, 0.0204, 0.1),
+    )
+    at = HorizonErrors("trial", 30, 0, models, (Change(*change),), None, 0.038)
+    _, first, second, *_ = error_lines(PairedErrors({"trial": at}, None, 30))
+    assert shown[0] in first
+    assert shown[1] in second
+    assert "46.10 (20.40)" in second

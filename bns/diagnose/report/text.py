@@ -231,7 +231,7 @@ def error_lines(errors: PairedErrors, before_added: str = "") -> Iterator[str]:
             change, verdict = _change(e.changes[index - 1]) if index else ("", "")
             noise = f"{1e3 * e.noise_floor_m:8.2f}" if np.isfinite(e.noise_floor_m) else f"{'?':>8}"
             ends = f"{noise}{e.windows:9d}" if index == 0 else ""
-            error, name = f"{_mm(m.rms_m):>8} ({_mm(m.median_m):>5})", (before_added if index else "") + m.name
+            error, name = "{:>8} ({:>5})".format(*_mm(m.rms_m, m.median_m)), (before_added if index else "") + m.name
             yield f"  {horizon if index == 0 else '':10}{name:26}{error}{change:>30}{ends}{verdict}".rstrip()
     if any(e.left_out for e in errors.horizons.values()):
         left_out = ", ".join(f"{e.left_out} at {h}" for h, e in errors.horizons.items() if e.left_out)
@@ -250,11 +250,13 @@ def _change(c: Change) -> tuple[str, str]:
     if not np.isfinite(c.low_m):
         return f"{1e3 * c.change_m:+.2f} (too few trials)", ""
     verdict = "" if c.fell else "  rises" if c.rose else "  undecided"
-    return f"{1e3 * c.change_m:+.2f} ({1e3 * c.low_m:+.2f} to {1e3 * c.high_m:+.2f})", verdict
+    return "{} ({} to {})".format(*_mm(c.change_m, c.low_m, c.high_m, sign="+")), verdict
 
 
-def _mm(metres: float) -> str:
-    return f"{1e3 * metres:.2f}" if 1e3 * metres < 1000 else f"{1e3 * metres:.0f}"
+def _mm(*metres: float, sign: str = "") -> list[str]:
+    """In millimetres, with as many decimals as the largest has room for."""
+    digits = 0 if any(abs(1e3 * one) >= 1000 for one in metres) else 2
+    return [f"{1e3 * one:{sign}.{digits}f}" for one in metres]
 
 
 def _ranking(d: Diagnosis) -> Iterator[str]:

@@ -32,7 +32,7 @@ def wandering_m(predictor: Predictor, noise: Array, horizon: str) -> float:
 
 
 def scatter_in_words(predictor: Predictor, noise: Array, errors: PairedErrors) -> list[str]:
-    """A sentence where the error at the longest horizon is far above tracking noise and the drive's scatter makes it."""
+    """A sentence where the error at the longest horizon is far above tracking noise: does the drive's scatter make it?"""
     longest = [horizon for horizon, at in errors.horizons.items() if at.windows][-1:]
     if not longest:
         return []
@@ -40,8 +40,16 @@ def scatter_in_words(predictor: Predictor, noise: Array, errors: PairedErrors) -
     at = errors.horizons[horizon]
     error, floor = at.models[-1].rms_m, at.noise_floor_m
     by_drive = wandering_m(predictor, noise, horizon)
-    if not (error > NOTABLE * floor and EXPLAINS < np.hypot(by_drive, floor) / error < 1.0 / EXPLAINS):
+    explained = np.hypot(by_drive, floor) / error
+    if not (error > NOTABLE * floor and explained < 1.0 / EXPLAINS):
         return []
+    if explained <= EXPLAINS:
+        return [
+            f"The error over {IN_WORDS[horizon]} ({1e3 * error:.3g} mm) is far above tracking noise ({1e3 * floor:.3g} mm), and "
+            f"a drive that scatters as this one does from pose to pose makes only {1e3 * by_drive:.3g} mm. So something is "
+            "left in which no listed effect and no curve finds a pattern: trials that differ from one another, or what happens "
+            "at single speeds or for moments. Drive the same commands several times: no model can predict how such repeats scatter."
+        ]
     ahead, aside, turn = 1e3 * noise[2], 1e3 * noise[3], np.degrees(noise[4])
     return [
         f"The error over {IN_WORDS[horizon]} ({1e3 * error:.3g} mm) is above tracking noise ({1e3 * floor:.3g} mm) because the "
