@@ -240,8 +240,8 @@ def test_a_first_round_cut_short_counts_its_runs_and_saves_nothing(tmp_path):
     sweep = make_sweep(combos=12)
 
     def carry_out(part, request):
-        one = replace(part, chosen=part.chosen[:3])
-        return replace(run_sweep(one, request.results, job=sweep_jobs.ok, executor=SerialExecutor(sweep_jobs.ok)), stopped_by="budget")
+        few, executor = replace(part, chosen=part.chosen[:3]), SerialExecutor(sweep_jobs.ok)
+        return replace(run_sweep(few, request.results, job=sweep_jobs.ok, executor=executor), stopped_by="budget")
 
     summary, ranking = run_until_ranked(SimpleNamespace(carry_out=carry_out), sweep, Request(tmp_path))
     assert (summary.done, ranking.runs, ranking.best) == (3, 3, ())
