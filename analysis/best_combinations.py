@@ -21,7 +21,7 @@ from analysis.outcomes import NEAR, criterion
 from analysis.ranking import TEN, in_words, ranking, varied
 from analysis.results import Results
 from analysis.selection import CONFIRMING, Selection, selections
-from bns.plotting.style import BLUE, RED, note, panels, style
+from bns.plotting.style import BLUE, RED, TEXT_PT, note, panels, style
 from bns.sweep.expand.shipped_sweeps import shipped_sweeps
 
 NAME = "best-combinations"
@@ -63,6 +63,14 @@ def not_worse_than(rows: pd.DataFrame, best: pd.Series) -> np.ndarray:
     return holm([known[pair] for pair in pairs])
 
 
+def tied(rows: pd.DataFrame) -> tuple[str, ...]:
+    """What is said where more combinations than are shown succeed as often as the first; ``rows``: from best to worst."""
+    alike = int((rows.success == rows.success.iloc[0]).sum())
+    if alike <= TEN:
+        return ()
+    return (f"{alike} combinations tie at {100 * rows.success.iloc[0]:.0f} %, in the order of wider goal radii and mean fitness",)
+
+
 @style()
 def _draw(store: Results, chosen: Selection, task: str, rows: pd.DataFrame) -> FigureResult:
     best, again = rows.head(TEN), confirmed(store, chosen, task)
@@ -71,14 +79,17 @@ def _draw(store: Results, chosen: Selection, task: str, rows: pd.DataFrame) -> F
     equal = int((not_worse_than(others, rows.iloc[0]) >= LEVEL).sum()) if len(others) else 0
     figure, axes = panels(1, 1.5 + 0.26 * len(best), wide=True)
     _panel(axes[0, 0], best, varied(rows))
-    axes[0, 0].set_title(f"{task_title(chosen.robot, task)}: the {len(best)} best of {counted(len(rows), 'combination')}")
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
+    # Over the whole figure: beside the names of the combinations the axes are narrow.
+    title = f"{task_title(chosen.robot, task)}: the {len(best)} best of {counted(len(rows), 'combination')}"
+    handles = axes[0, 0].get_legend_handles_labels()
+    figure.legend(*handles, loc="outside upper center", ncols=2, title=title, title_fontsize=TEXT_PT + 1)
     reruns, n = int(best.confirm_runs.sum()), int(best.runs.sum())
     said = coverage(store, chosen.sweeps, chosen.n)
     name = chosen.sweeps[0]
     how = f"bns sweep {name if name in shipped_sweeps() else f'{name}.yaml'} --confirm-top {TEN}"
     unconfirmed = () if reruns else (f"not confirmed on fresh seeds: {how}",)
-    note(figure, "; ".join((f"{n:,} runs", *said.missing, *(unconfirmed and ("not confirmed",)), f"bars: {INTERVALS}")) + ".")
+    doubts = (*said.missing, *(unconfirmed and ("not confirmed",)), *tied(rows))
+    note(figure, "; ".join((f"{n:,} runs", *doubts, f"bars: {INTERVALS}")) + ".")
     shows = (
         f"The {len(best)} best combinations of {counted(len(rows), 'combination')}, by the fraction of runs whose fittest "
         f"controller {criterion(store, chosen)} at the last evaluation. As swept: n = {n:,} runs of "
@@ -113,4 +124,5 @@ def _in_words(rows: pd.DataFrame, best: pd.DataFrame, equal: int) -> str:
     said = f"The first has {100 * best.success.iloc[0]:.0f} % as swept"
     if best.confirm_runs.iloc[0]:
         said += f" and {100 * best.confirm_successes.iloc[0] / best.confirm_runs.iloc[0]:.0f} % on fresh seeds"
+    said += "".join(f"; {text}" for text in tied(rows))
     return f"{said}; {equal} of the {len(rows) - 1} others cannot be distinguished from it (Fisher's test, Holm, {LEVEL:g})."

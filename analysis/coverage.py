@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from analysis.labels import counted
-from analysis.results import Results, among
+from analysis.results import Results, among, planned_runs
 from analysis.selection import failures, finished
 from bns.store.schema import PARAMETERS
 
@@ -35,7 +35,7 @@ def coverage(store: Results, sweeps: Sequence[str], n: int | None = None) -> Cov
         _finished_cells(store, [name for name, plan in plans.items() if plan.cells]),
     )
     n = whole if n is None else n
-    planned, cells = (sum(getattr(plan, what) for plan in plans.values()) for what in ("runs", "cells"))
+    planned, cells = planned_runs(plans.values()), sum(plan.cells for plan in plans.values())
     amount, missing = counted(n, "run"), []
     if n < planned:
         amount = f"{n:,} of {planned:,} runs"

@@ -81,11 +81,14 @@ def _fitness(ax: Axes, rows: pd.DataFrame, per_evaluation: int) -> None:
 
 
 def _distances(ax: Axes, probes: pd.DataFrame) -> None:
-    for _, one in probes.groupby("probe"):
-        ax.plot(one.evaluation, 100 * one.distance_m, color=GREY, linewidth=0.6, alpha=0.7)
-    ax.plot(100 * probes.groupby("evaluation").distance_m.median(), color=BLUE, linewidth=2)
+    for number, (_, one) in enumerate(probes.groupby("probe")):
+        label = "_" if number else "each random controller"
+        ax.plot(one.evaluation, 100 * one.distance_m, color=GREY, linewidth=0.6, alpha=0.7, label=label)
+    ax.plot(100 * probes.groupby("evaluation").distance_m.median(), color=BLUE, linewidth=2, label="median")
     ax.set(ylabel="distance (cm)")
     _log(ax, probes.distance_m)
+    ax.set_ylim(top=6 * ax.get_ylim()[1] if ax.get_yscale() == "log" else None)  # room for the legend
+    ax.legend(loc="upper left", handlelength=1.5)
 
 
 def _changes(ax: Axes, probes: pd.DataFrame) -> pd.Series:

@@ -44,6 +44,10 @@ class Plan:
     cells: int
     varied: frozenset[str]
     """Those of the compared parameters that take more than one value."""
+    asked: frozenset[tuple[Any, ...]] = frozenset()
+    """The combinations themselves, with the robot: two sweeps may ask for the same."""
+    numbers: range = range(0)
+    """The seeds of each."""
 
     @property
     def seeds(self) -> int:
@@ -125,8 +129,8 @@ class Results:
 def _lacking(fault: Exception) -> str:
     """The column or table that a database says it lacks, or what it says."""
     first = str(fault).partition("\n")[0].partition(": ")[2]
-    found = re.search(r"(column|Table)[^\w]*(?:with name )?([\w.]+)", first)
-    return f"{found[1].lower()} {found[2]}" if found else first
+    found = re.search(r'([Cc]olumn) "([\w.]+)"|(Table) with name ([\w.]+)', first)
+    return f"{found[1] or found[3]} {found[2] or found[4]}".lower() if found else first
 
 
 def _plan(name: str, text: str, runs: float) -> Plan:
@@ -137,7 +141,20 @@ def _plan(name: str, text: str, runs: float) -> Plan:
     varied = {
         name for name in CELL if len({float(combo.get(name, FIELDS[name].default)) for combo in sweep.combos}) > 1
     }
-    return Plan(sweep.total, len(sweep.combos), frozenset(varied))
+    fields = [field for name, field in FIELDS.items() if name not in {"robot", "seed"}]
+    asked = {(sweep.robot, *(combo.get(field.name, field.default) for field in fields)) for combo in sweep.combos}
+    return Plan(sweep.total, len(sweep.combos), frozenset(varied), frozenset(asked), sweep.all_seeds)
+
+
+def planned_runs(plans: Iterable[Plan]) -> int:
+    """How many runs several sweeps ask for; what two of them ask for is one run."""
+    seeds: dict[tuple[Any, ...], set[int]] = {}
+    unread = 0
+    for plan in plans:
+        unread += 0 if plan.asked else plan.runs
+        for combination in plan.asked:
+            seeds.setdefault(combination, set()).update(plan.numbers)
+    return unread + sum(map(len, seeds.values()))
 
 
 def remembered(work: Callable[Concatenate[Results, P], R]) -> Callable[Concatenate[Results, P], R]:

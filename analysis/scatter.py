@@ -21,6 +21,8 @@ from bns.plotting.style import lettered, note, ordered_styles, panels, style
 
 CROWD = 60
 """From this many dots a panel on, means of groups are drawn in place of each dot's interval: nobody could tell these apart."""
+LEGEND_PT = 6.0
+"""Size of a marker in the legend, however small the dots are: its colour and shape must be told."""
 GROUPS = 5
 """Groups of equally many combinations, by diversity, whose means are drawn."""
 
@@ -118,6 +120,7 @@ def _legend(figure: Figure, axes: Sequence[Axes], parameter: str, values: Sequen
         loc="outside upper center",
         ncols=len(labels),
         title=TITLES[parameter],
+        markerscale=LEGEND_PT / max(min(named[label].get_markersize() for label in labels), 1.0),
         columnspacing=1.0,
         handletextpad=0.1,
     )

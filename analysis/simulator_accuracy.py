@@ -23,6 +23,7 @@ PAPER = "figures 5.7 to 5.10"
 STABLE = "stable"
 SOURCE = {"dx_yellow": (0.84, 0.85), "dy_yellow": (0.17, 0.28), "dx_green": (0.75, 0.90), "dy_green": (0.05, 0.25)}
 """R² and slope of the dissertation's regression lines (section 5.5.1)."""
+BRACKETS = "In brackets: the dissertation's R² and slope."
 SOURCE_STABILITY = {"stable": 0.94, "unstable": 0.58}
 """Shares of stable and unstable verification cycles that the dissertation's network got right."""
 
@@ -62,7 +63,8 @@ def _draw(simulator: StaticSimulator) -> FigureResult:
     rows = pd.DataFrame([_row(name, about["accuracy"][name]) for name in names])
     table = pd.concat([rows, _stability(simulator.networks, measured, predicted)], ignore_index=True)
     n = int(learnable[0].sum())
-    note(figure, f"{n} stable cycles of {len(measured)} that took no part in training; each point one cycle. {_said(table)}")
+    took = f"{n} stable cycles of {len(measured)} that took no part in training; each point one cycle."
+    note(figure, f"{took} {BRACKETS} {_said(table)}")
     shows = (
         f"Displacement in a cycle as the static simulator of the {robot.name} predicts it, against that in the physics "
         f"world, for n = {n} stable verification cycles. Dashed: prediction is right; solid: regression of predicted on "

@@ -160,4 +160,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__} - {"TYPE_CHECKING", "Any", "ModuleType", "annotations"})
+    return sorted({*globals(), *__all__} - {"TYPE_CHECKING", "Any", "ModuleType", "annotations", "importlib", "sys"})

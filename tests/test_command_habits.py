@@ -209,6 +209,22 @@ def test_a_shipped_sweep_is_known_by_its_name(tmp_path, monkeypatch):
         load_sweep("kepera")
 
 
+@pytest.mark.parametrize("command", ["compare", "diagnose", "add"])
+def test_a_file_in_the_place_of_a_folder_for_figures_is_refused_before_anything_is_computed(command, tmp_path, capsys):
+    (tmp_path / "junk.csv").write_text("")
+    with pytest.raises(SystemExit) as ended:
+        main([command, "no.csv", "--model", "khepera", "--figures", str(tmp_path / "junk.csv")])
+    assert ended.value.code == 2
+    assert "junk.csv' is a file; give a folder" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["propose", "report"])
+def test_minutes_say_that_the_last_trial_is_driven_to_its_end(command, capsys):
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    assert "minutes of driving to plan, the last trial driven to its end" in " ".join(capsys.readouterr().out.split())
+
+
 def test_effects_are_listed(capsys):
     rows = answer(capsys, "effects", "--json")
     assert [row["effect"] for row in rows] == list(all_effects())

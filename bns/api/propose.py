@@ -128,7 +128,7 @@ def propose(
     Args:
         log: a file, a table, or `bns.Measurements`.
         model: `bns.Model`, or the name or file of one.
-        minutes: of driving, above 0 and at most 600.
+        minutes: of driving, above 0 and at most 600; the last trial is driven to its end.
         arena: where the robot may be: (width, height) in m around the start, or (lowest x, highest x, lowest y, highest y) in m;
             by default where it was seen.
         start: x_m, y_m (m) and heading_rad (rad, counter-clockwise from x) of the start of every trial; by default as before.

@@ -61,3 +61,7 @@ def test_a_missing_table_or_column_is_named(real_results, tmp_path):
         store.query("SELECT left_units FROM paths")
     with pytest.raises(NoDataError, match="training_error"):
         store.query("SELECT training_error FROM evals")
+    with pytest.raises(NoDataError, match=r"\(column cpu_s\)"):  # which DuckDB says in other words
+        store.query("SELECT any_value(cpu_s) AS cpu_s FROM evals JOIN runs USING (run_id, sweep)")
+    with pytest.raises(NoDataError, match=r"\(table hours\)"):
+        store.query("SELECT * FROM hours")

@@ -9,6 +9,7 @@ from analysis import budget, paths, scatter, success_by_diversity, success_by_mu
 from analysis.__main__ import figures
 from analysis.intervals import POOLED, pooled, wilson
 from analysis.results import NoDataError, Results
+from analysis.scatter import LEGEND_PT
 from bns.errors import SweepWarning
 from bns.plotting.style import COLUMN_IN, PAGE_IN, TEXT_PT
 from bns.spec import RunSpec
@@ -262,6 +263,13 @@ def test_a_plan_of_an_older_version_with_a_value_twice_is_read(tmp_path):
     assert (plan.runs, plan.cells, plan.varied) == (6, 2, {"mutation_rate"})
 
 
+def test_what_two_sweeps_ask_for_is_planned_once(tmp_path):
+    text = "name: {}\nrobot: khepera\nseeds: {}\nfixed: {{evaluations: 4, task: circle}}\ngrid: {{mutation_rate: {}}}"
+    written(tmp_path, "all", [record(spec) for spec in specs(2)], sweep_text=text.format("all", 3, [0.1, 0.5, 0.9]), sweep_runs=9)
+    written(tmp_path, "part", [record(spec) for spec in specs(2)], sweep_text=text.format("part", 4, [0.1, 0.5]), sweep_runs=8)
+    assert "4 of 11 runs so far" in success_by_mutation.draw(Results(tmp_path))[0].missing
+
+
 def test_one_run_of_a_planned_grid_is_drawn_with_its_wide_interval(tmp_path):
     text = "name: grid\nrobot: khepera\nfixed: {evaluations: 4, task: circle}\ngrid: {mutation_rate: [0.1, 0.5]}"
     written(tmp_path, "grid", [record(specs(1)[0])], sweep_text=text, sweep_runs=2)
@@ -345,3 +353,8 @@ def test_a_band_of_pooled_runs_knows_that_they_share_the_luck_of_their_seeds():
     halves = pooled(pd.concat([one_more.assign(task="infinity"), rows]), ("task",))
     assert len(halves) == 4
     assert halves[halves.task == "circle"].low.to_numpy() == pytest.approx(found.low.to_numpy())
+
+
+def test_markers_of_a_legend_are_large_enough_however_many_dots_there_are(study):
+    (drawn, *_) = success_by_diversity.draw(Results(study))
+    assert {handle.get_markersize() for handle in drawn.figure.legends[0].legend_handles} == {LEGEND_PT}

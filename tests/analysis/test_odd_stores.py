@@ -119,6 +119,7 @@ def test_one_run_shows_its_own_generations_and_probes(real_results):
     assert drawn.figure.axes[1].get_lines()[-1].get_ydata() == pytest.approx(
         100 * probes.groupby("evaluation").distance_m.median().to_numpy(), abs=6e-4
     )  # of 0.01 mm
+    assert [text.get_text() for text in drawn.figure.axes[1].get_legend().get_texts()] == ["each random controller", "median"]
     totals = 100 * probes.query("evaluation > 1").groupby("evaluation").change_m.sum()
     assert drawn.figure.axes[2].get_lines()[0].get_ydata() == pytest.approx(totals.to_numpy(), abs=6e-3)
 

@@ -149,6 +149,24 @@ def test_who_cannot_be_told_from_the_best_is_corrected_for_many_comparisons(tmp_
     assert any("bns sweep grid.yaml --confirm-top 10" in text for text in drawn.missing)
 
 
+def test_more_equals_of_the_best_than_are_shown_are_counted_and_the_title_is_whole(tmp_path, texts):
+    rates = [round(0.1 + 0.05 * number, 2) for number in range(13)]
+    written(tmp_path, "grid", [one for rate in rates for one in rated(rate, good=5 if rate < 0.7 else 4)])
+    drawn = best_combinations.draw(Results(tmp_path))[0]
+    assert "12 combinations tie at 100 %" in drawn.see
+    said = " ".join(text.replace("\n", " ") for text, _ in texts(drawn.figure))
+    assert "12 combinations tie at 100 %, in the order of wider goal radii and mean fitness" in said
+    drawn.figure.draw_without_rendering()
+    title, page = drawn.figure.legends[0].get_title(), drawn.figure.bbox
+    assert title.get_text().endswith("the 10 best of 13 combinations")
+    assert page.x0 <= title.get_window_extent().x0 < title.get_window_extent().x1 <= page.x1
+
+
+def test_no_more_equals_than_are_shown_need_no_word(tmp_path):
+    written(tmp_path, "grid", [*rated(0.1, good=5), *rated(0.5, good=5)])
+    assert "tie" not in best_combinations.draw(Results(tmp_path))[0].see
+
+
 def test_a_shipped_sweep_is_named_as_the_command_takes_it(tmp_path):
     written(tmp_path, "khepera", [*rated(0.1, seeds=10, good=5), *rated(0.3, seeds=10, good=9)])
     drawn = best_combinations.draw(Results(tmp_path))[0]

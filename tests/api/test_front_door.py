@@ -80,6 +80,7 @@ def test_importing_loads_nothing_else():
 
 def test_every_name_is_listed_there_and_documented():
     assert set(bns.__all__) <= set(dir(bns))
+    assert not {"importlib", "sys"} & set(dir(bns))
     for name in bns.__all__:
         thing = getattr(bns, name)
         assert name == "__version__" or len(thing.__doc__) > 20, name

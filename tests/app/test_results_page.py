@@ -75,6 +75,11 @@ def test_runs_are_filtered_compared_and_driven_again_in_the_browser(results, vis
     visited = visit(results)
     page = visited.open()
     page.get_by_text("12 of 12 finished runs.").wait_for()
+    assert figures(page).count() == 2  # no curve before a run is chosen
+    page.get_by_role("checkbox", name="Look for new runs every 10 s").check()
+    page.get_by_role("checkbox", name="Look for new runs every 10 s").uncheck()
+    assert page.get_by_text("Orange (dots: triangles): no success").count() == 1
+    assert page.get_by_text("0 where all controllers are alike").count() == 1
     page.get_by_label("Only mutation rate (none: all)").select_option("0.9")
     page.get_by_text("6 of 12 finished runs.").wait_for()
     point_at_a_dot(page)
@@ -84,7 +89,7 @@ def test_runs_are_filtered_compared_and_driven_again_in_the_browser(results, vis
     page.get_by_label("Run B", exact=True).select_option(index=4)
     page.locator("#bns-run-b").wait_for()
     page.get_by_role("button", name="Repeat the run to see its path").first.click()
-    figures(page).nth(4).wait_for()  # the path beside the three that are there from the start, and that under the pointer
+    figures(page).nth(4).wait_for()  # the path beside the two that are there from the start, the curve and that under the pointer
     settled(page)
     shown(page, "results")
     page.close()

@@ -68,6 +68,37 @@ def test_misleading_data_are_refused(table, change, message):
         checked(table.assign(**change(table)))
 
 
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"x_m": 10.0}, "Along x_m the robot goes .* as far as along y_m, .*different units, as cm and mm are"),
+        ({"x_m": 0.1}, "Along y_m the robot goes .* as far as along x_m, .*different units, as cm and mm are"),
+        ({"x_m": 1000.0}, "units, as m and mm are.*give x_m and y_m the same `unit` and `scale`"),
+        ({"y_m": 2.54}, "different units, as in and cm are"),
+        ({"x_m": 100.0, "y_m": 1000.0}, "different units, as cm and mm are"),
+    ],
+)
+@pytest.mark.parametrize("turned", [0.0, 1.0])
+def test_x_and_y_in_different_units_are_said_before_any_advice_on_speeds(table, change, message, turned):
+    scaled = {name: factor * table[name] for name, factor in change.items()} | {"heading_rad": table.heading_rad + turned}
+    with pytest.raises(DataError, match=message):
+        checked(table.assign(**scaled))
+
+
+def test_axes_of_one_unit_pass_however_the_frame_lies(table):
+    def said(**change):
+        try:
+            checked(table.assign(**change))
+        except DataError as fault:
+            return str(fault)
+        return ""
+
+    for change in ({"heading_rad": table.heading_rad + 1.0}, {"x_m": table.y_m, "y_m": table.x_m}, {"x_m": 1.6 * table.x_m}):
+        assert "different units" not in said(**change)
+    along = 0.04 * table.left_m_s.groupby(table.trial).cumsum()  # in one direction, which the heading does not tell
+    assert "different units" not in said(x_m=along, y_m=0.1 * along, heading_rad=1.0, right_m_s=table.left_m_s)
+
+
 def test_a_robot_that_is_stuck_has_no_commands_in_another_unit(table):
     rng = np.random.default_rng(4)
     stuck = table.assign(x_m=0.1 + 0.002 * rng.normal(size=len(table)), y_m=0.002 * rng.normal(size=len(table)))

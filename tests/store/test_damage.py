@@ -244,6 +244,7 @@ def test_empty_and_missing_results_name_the_commands_to_begin_with(tmp_path):
     [
         (lambda r: load(r, "eval"), "unknown table 'eval'. Did you mean 'evals'"),
         (lambda r: load(r, columns=["succes_7cm"]), "column of evals 'succes_7cm'. Did you mean 'success_7cm'"),
+        (lambda r: load(r, columns="seed"), r"columns is 'seed'; it must be a list of names: \['seed'\]"),
         (lambda r: load(r, where={"mutation": 1}), "unknown column of evals 'mutation'"),
         (lambda r: load(r, where="mutation > 1"), "DuckDB cannot answer .*mutation"),
         (lambda r: load(r, where={"seed": object()}), "a condition cannot compare with"),

@@ -230,3 +230,10 @@ def test_a_world_that_is_no_file_is_named_with_its_line_once_a_run_needs_it(tmp_
 def test_values_under_zip_may_come_twice(tmp_path):
     sweep = sweep_of(tmp_path, "zip: {evaluations: [1, 1], population_size: [2, 3]}")
     assert [combo["population_size"] for combo in sweep.combos] == [2, 3]
+
+
+def test_a_folder_is_no_sweep_and_no_misspelt_name_of_one(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine").mkdir()
+    with pytest.raises(SpecError, match=r"mine is a folder; give the sweep file in it: mine/NAME\.yaml"):
+        load_sweep("mine")

@@ -1,6 +1,7 @@
 """A sweep that stops when its best are known: the same ranking as the complete one, from fewer runs, after any kill."""
 
 from collections import Counter
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -233,6 +234,21 @@ def test_a_run_that_always_fails_is_tried_once_a_call_when_failed_ones_are_to_be
         request = Request(tmp_path, retry_failed=True)
         summary, ranking = run_until_ranked(SimpleNamespace(carry_out=carry_out), sweep, request)
         assert (tried[broken], summary.failed, summary.new_failed, ranking.open) == (call, 1, 1, 0)
+
+
+def test_a_first_round_cut_short_counts_its_runs_and_saves_nothing(tmp_path):
+    sweep = make_sweep(combos=12)
+
+    def carry_out(part, request):
+        few, executor = replace(part, chosen=part.chosen[:3]), SerialExecutor(sweep_jobs.ok)
+        return replace(run_sweep(few, request.results, job=sweep_jobs.ok, executor=executor), stopped_by="budget")
+
+    summary, ranking = run_until_ranked(SimpleNamespace(carry_out=carry_out), sweep, Request(tmp_path))
+    assert (summary.done, ranking.runs, ranking.best) == (3, 3, ())
+    first, *_, last = ranking.in_words().splitlines()
+    assert first == "no combination has all of its runs yet, so none is ranked"
+    assert f"not decided: {ranking.open} more combinations may be among them" in last
+    assert last.endswith(f"; 3 of {sweep.total} runs so far")
 
 
 @pytest.mark.slow

@@ -8,17 +8,17 @@ from typing import Any
 import panel as pn
 
 from bns.app.design import template
-from bns.app.figures.runs import CurveFigure, ParallelFigure, RunsFigure
+from bns.app.figures.runs import COLOURS, CurveFigure, ParallelFigure, RunsFigure
 from bns.app.names import called
 from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, on_change, row, together
 from bns.app.results.hovered import HoveredRun
 from bns.app.results.one_run import OneRun
-from bns.app.results.study import CURVES, OUTCOMES, PARAMETERS, Study
+from bns.app.results.study import CURVES, DIVERSITY, OUTCOMES, PARAMETERS, Study
 from bns.app.web.connection import watch_connection
 from bns.errors import StoreError
 
 TITLE = "bns explore: results"
-EVERY_MS = 10_000
+EVERY_MS, EVERY = 10_000, "Look for new runs every 10 s"
 _MOST_NAMES = 2_000
 """Of runs in a menu; filters make the list shorter."""
 _MOST_SHOWN = 6
@@ -43,10 +43,11 @@ class ResultsScreen:
         self._y = pn.widgets.Select(**called("Up"), options=_options(OUTCOMES), value="fitness_error", width=220)
         self._curve = pn.widgets.Select(**called("Curve"), options=_options(CURVES), width=220)
         self._names = [pn.widgets.Select(**called(f"Run {letter}"), options=[], **WIDE) for letter in "AB"]
-        self._live = pn.widgets.Checkbox(**called("Look for new runs every 10 s"), value=False)
+        self._live = pn.widgets.CheckBoxGroup(options=[EVERY])  # a single Checkbox of Panel has no name for a screen reader
         self._clock: Any = None
         self._next = 0
         self._dots, self._parallel, self._curves = RunsFigure(self._pick, self._hover), ParallelFigure(), CurveFigure()
+        self._curve_pane = pn.Column(**WIDE)
         self._runs, self._hovered = [OneRun(study, letter) for letter in "AB"], HoveredRun(study)
         for menu in self._filters.values():
             on_change(menu, self._draw)
@@ -55,10 +56,11 @@ class ResultsScreen:
         for which, name in enumerate(self._names):
             on_change(name, partial(self._show_run, which, name))
         on_change(self._curve, self._draw_curves)
-        on_change(self._live, lambda: self._watch(self._live.value))
+        on_change(self._live, lambda: self._watch(bool(self._live.value)))
         self.view = self._laid_out()
         self._fill_menus()
         self._draw()
+        self._draw_curves()
 
     def _laid_out(self) -> Any:
         filters = pn.Column(
@@ -69,8 +71,9 @@ class ResultsScreen:
             *self._filters.values(),
             **WIDE,
         )
-        dots = drawn(self._dots.figure)
-        pictures = pn.Column(drawn(self._parallel.figure), row(self._x, self._y), dots, self._hovered.view, **WIDE)
+        dots, said = drawn(self._dots.figure), html(f"<p>{COLOURS} {DIVERSITY}</p>")
+        axes = row(self._x, self._y)
+        pictures = pn.Column(drawn(self._parallel.figure), axes, dots, said, self._hovered.view, **WIDE)
         words = html(
             "<p>Click a dot, or choose here: the first click is run A, the next run B. Point at a dot to see its path and "
             "its curve.</p>"
@@ -80,7 +83,7 @@ class ResultsScreen:
             heading("Two runs side by side"),
             words,
             beside(*self._names, self._curve),
-            drawn(self._curves.figure),
+            self._curve_pane,
             pair,
             **WIDE,
         )
@@ -132,9 +135,9 @@ class ResultsScreen:
                 rows = self._study.curve(run_id)
                 self._curves.fill(which, rows["evaluation"], rows[column])
             else:
-                self._curves.fill(
-                    which, [0.0], [0.0]
-                )  # a picture without a point has no size, which Bokeh complains of
+                self._curves.hide(which)
+        if self._curves.empty == bool(self._curve_pane.objects):  # Bokeh complains of a picture without a curve
+            self._curve_pane.objects = [] if self._curves.empty else [drawn(self._curves.figure)]
 
     def _watch(self, on: bool) -> None:
         if on and self._clock is None:

@@ -36,6 +36,10 @@ OUTCOMES = {
     "fittest_commands": "commands of the fittest",
 }
 """Columns of a run's last evaluation, in words."""
+DIVERSITY = (
+    "Diversity: how far, on average, a controller's commands lie from the population's mean commands, summed over its commands, "
+    "each number relative to its range; no unit, 0 where all controllers are alike."
+)
 CURVES = {
     "fitness_error": "fitness error (1/m)",
     "diversity": "diversity",

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from bns.cli.options.option_types import folder
 from bns.cli.parser import Parser, add_trust, data_first
 
 if TYPE_CHECKING:
@@ -87,7 +88,7 @@ def add_commands(command: Adder) -> None:
         one.add_argument("--findings", action="store_true", help="list all irregularities in the data, not only five")
     for one in (held, found, more):
         add_model_options(one)
-        one.add_argument("--figures", type=Path, metavar="DIR", help="also write figures into this folder")
+        one.add_argument("--figures", type=folder, metavar="DIR", help="also write figures into this folder")
     add_effect_options(found)
     add_fresh(held)
     found.add_argument(

@@ -49,7 +49,13 @@ def add_commands(command: Adder) -> None:
 
 def add_experiment_options(parser: argparse.ArgumentParser) -> None:
     """How long, where and how fast."""
-    parser.add_argument("--minutes", type=float, default=MINUTES, metavar="N", help="minutes of driving to plan (default: 10)")
+    parser.add_argument(
+        "--minutes",
+        type=float,
+        default=MINUTES,
+        metavar="N",
+        help="minutes of driving to plan, the last trial driven to its end (default: 10)",
+    )
     parser.add_argument(
         "--arena",
         metavar="WxH",

@@ -24,7 +24,7 @@ def add_commands(command: Adder) -> None:
     many.add_argument("files", nargs="+", metavar="FILE", help=f"{_FILES}; taken in this order")
     many.add_argument("--jobs", type=positive, metavar="N", help="worker processes per machine (default: one per core)")
     many.add_argument(
-        "--budget", type=duration, metavar="TIME", help="stop after this time: 90s, 10m, 1h30m (shared by all files)"
+        "--budget", type=duration, metavar="TIME", help="stop after this time: 90 (s), 10m, 1h30m (shared by all files)"
     )
     add_cluster_options(many, positive, duration)
     many.add_argument("--retry-failed", action="store_true", help="repeat failed and quarantined runs")

@@ -8,6 +8,7 @@ import math
 import re
 from collections.abc import Callable
 from decimal import Decimal
+from pathlib import Path
 
 from bns.errors import SpecError
 from bns.spec import FIELDS, checked, field_type
@@ -35,6 +36,14 @@ def interval(text: str) -> float:
     if seconds < 1.0:
         raise argparse.ArgumentTypeError(f"{text!r} is too short; look every 1s or less often")
     return seconds
+
+
+def folder(text: str) -> Path:
+    """A folder that is there or is still to be made: said before anything is computed for it."""
+    path = Path(text)
+    if path.exists() and not path.is_dir():
+        raise argparse.ArgumentTypeError(f"{text!r} is a file; give a folder")
+    return path
 
 
 def add_spec_options(parser: argparse.ArgumentParser, without: tuple[str, ...] = ()) -> None:

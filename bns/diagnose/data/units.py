@@ -10,6 +10,7 @@ import pandas as pd
 from bns.diagnose.data.mapping import SIZES
 from bns.diagnose.data.merge_topics import without_commands
 from bns.diagnose.data.speed_units import Ways, mistake_of, speed_note
+from bns.diagnose.data.unlike_axes import refuse_unlike_axes
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 from bns.measurements import COMMANDS, POSE
@@ -42,7 +43,7 @@ def check_units(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -
         unit = next(unit for least, unit in _FINER if step > least)
         raise DataError(_apart(step, unit))
     _check_length(table)
-    ways, driven = _driven(table, trials)
+    ways, driven, moved = _driven(table, trials)
     speed = float(np.nanmax(np.abs(table[list(COMMANDS)].to_numpy())))
     ratio = _ratio(ways[:, 0], ways[:, 1]) if len(ways) else float("nan")
     untold = without_commands(table)
@@ -52,6 +53,7 @@ def check_units(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -
             "commanded. Are the commands in separate rows? `hold_commands_s: .inf` in the mapping of `bns import` keeps "
             "each until the next."
         )
+    refuse_unlike_axes(driven.forward_m, *moved)  # before any advice that takes the way for one length
     if step >= 1.0 and 1 / 3000 < ratio < 1 / 300:
         raise DataError(_apart(step, "milliseconds"))
     if speed > FASTEST_M_S:
@@ -172,13 +174,16 @@ def _correlation(one: np.ndarray, other: np.ndarray) -> float:
     return float(np.corrcoef(one, other)[0, 1]) if one.std() > 0 and other.std() > 0 else 0.0
 
 
-def _driven(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -> tuple[np.ndarray, Ways]:
-    """For windows of about a second (windows, 4): way and turn commanded (base of 1 m), way and turn seen; and the same as ways.
+def _driven(
+    table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]
+) -> tuple[np.ndarray, Ways, tuple[np.ndarray, np.ndarray]]:
+    """For windows of about a second (windows, 4): way and turn commanded (base of 1 m), way and turn seen; the same as ways; and
+    the heading halfway with the motion along x and y (windows, 2).
 
     A trial that is shorter than that, such as a single motion of a sensor, is a window.
     """
     times, commands, poses = table["t_s"].to_numpy(), table[list(COMMANDS)].to_numpy(), table[list(POSE)].to_numpy()
-    found = [np.zeros((0, 6))]
+    found = [np.zeros((0, 9))]
     for number, (_, at) in enumerate(trials):
         t, pose = times[at], poses[at]
         left, right = np.nan_to_num(commands[at]).T
@@ -194,9 +199,10 @@ def _driven(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -> tu
         heading = np.zeros(len(t))
         heading[seen] = np.unwrap(pose[seen, 2])
         a, b = marks[:-1], marks[1:]
-        went = np.hypot(*(pose[b, :2] - pose[a, :2]).T)
+        moved = pose[b, :2] - pose[a, :2]
+        went = np.hypot(*moved.T)
         told = [way[b] - way[a], went, turn[b] - turn[a], heading[b] - heading[a], forward[b] - forward[a]]
-        found.append(np.column_stack([*told, np.full(len(a), number)]))
+        found.append(np.column_stack([*told, np.full(len(a), number), (heading[a] + heading[b]) / 2, moved]))
     windows = np.concatenate(found)
-    way, went, _, turned, forward, trial = windows.T
-    return windows[:, :4], Ways(forward, way, went, turned, trial.astype(np.int64))
+    way, went, _, turned, forward, trial, halfway, *_ = windows.T
+    return windows[:, :4], Ways(forward, way, went, turned, trial.astype(np.int64)), (halfway, windows[:, 7:])

@@ -82,6 +82,8 @@ def load_rows(
 
 def _loaded(results: Path | str, table: str, columns: Sequence[str] | None, where: Where) -> pa.Table:
     valid = read_columns(table)
+    if isinstance(columns, str):
+        raise StoreError(f"columns is {columns!r}; it must be a list of names: [{columns!r}].")
     wanted = list(valid if columns is None else columns)
     for name in [*wanted, *(where if isinstance(where, Mapping) else ())]:
         if name not in valid:

@@ -48,15 +48,16 @@ class Ranking:
         return 1.0 - self.runs / self.total
 
     def in_words(self) -> str:
-        """A table and what was saved."""
-        lines = [f"{'task':12} {'place':>5} {'success':>8} {'confidence':>10}  combination"]
+        """A table, and what was saved or is still to do."""
+        head = f"{'task':12} {'place':>5} {'success':>8} {'confidence':>10}  combination"
+        lines = [head if self.best else "no combination has all of its runs yet, so none is ranked"]
         for one in self.best:
             told = ", ".join(f"{name} {value}" for name, value in one.combination.items() if name != "task")
             lines.append(f"{one.task:12} {one.place:5} {one.success:8.3f} {one.confidence:10.1%}  {told}")
         state = "decided" if not self.open else f"not decided: {self.open} more combinations may be among them"
         sure = "for certain" if self.aim.confidence == 1.0 else f"at {self.aim.confidence:.4g} confidence for each task"
         lines.append(f"the {BEST} best of each task are {state} ({sure})")
-        lines[-1] += f"; {self.runs} of {self.total} runs, {self.saved:.0%} saved"
+        lines[-1] += f"; {self.runs} of {self.total} runs" + (" so far" if self.open else f", {self.saved:.0%} saved")
         if self.aim.within:
             lines.append(f"what is left out may be better than the last of them by less than {self.aim.within:g} of mean success")
         return "\n".join(lines)
@@ -83,7 +84,7 @@ def run_until_ranked(
         missing = race.todo(stored, success, failed - tried)
         now = _counted(sweep, race, stored, new, new_failed)
         if not missing:
-            return replace(now, stopped_by=DECIDED if now.remaining else None), ranking(race, request.results)
+            return replace(now, stopped_by=DECIDED if now.remaining else None), ranking(race, request.results, now)
         tried |= {race.run_id(number, seed) for number, seed in missing}
         part = replace(sweep, chosen=tuple(missing))
         summary = backend.carry_out(part, replace(request, wait=True, on_progress=_whole(request, now)))
@@ -91,11 +92,14 @@ def run_until_ranked(
         if summary.stopped_by is not None:
             stored, _ = results_of(request.results, sweep.name)
             stopped = replace(_counted(sweep, race, stored, new, new_failed), stopped_by=summary.stopped_by)
-            return stopped, ranking(race, request.results)
+            return stopped, ranking(race, request.results, stopped)
 
 
-def ranking(race: Race, folder: Path) -> Ranking:
-    """The best of the combinations that have all of their runs, by the rules of a whole sweep's ranking."""
+def ranking(race: Race, folder: Path, counts: Summary) -> Ranking:
+    """The best of the combinations that have all of their runs, by the rules of a whole sweep's ranking.
+
+    ``counts``: runs that have a result, those of a round that was cut short included.
+    """
     found: list[Ranked] = []
     whole = race.whole()
     chosen = best(race.sweep, folder, BEST, whole) if whole else []
@@ -107,8 +111,7 @@ def ranking(race: Race, folder: Path) -> Ranking:
         for at, (place, confidence) in enumerate(zip(places, sure, strict=True), 1):
             found.append(Ranked(task, at, race.sweep.combos[numbers[place]], float(mean[place]), confidence))
     left = sum(int((possible(results, race.aim) & ~results.whole).sum()) for results in race.results.values())
-    done = sum(int(results.seen.sum()) for results in race.results.values())
-    return Ranking(tuple(found), left, done, race.sweep.described, race.aim)
+    return Ranking(tuple(found), left, counts.total - counts.remaining, race.sweep.described, race.aim)
 
 
 def _aim(confidence: float, within: float) -> Aim:
