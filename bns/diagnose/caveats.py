@@ -23,6 +23,7 @@ from bns.diagnose.residuals.outliers import FAR
 from bns.diagnose.residuals.unexplained import Unexplained
 from bns.diagnose.residuals.worst_trials import WithoutWorst
 from bns.diagnose.select.known_effects import known_effects
+from bns.diagnose.select.negligible import Shift
 from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.diagnose.select.variants import order_of_friction, uncertain_variants
 from bns.diagnose.settings import DEFAULTS
@@ -83,6 +84,7 @@ def notes_on(
             f"more, so it is not named.{why}"
         )
     yield from _on_moved(found)
+    yield from _on_kept(found.kept_for)
     yield from _on_effects(selection, tracks, found.imitating)
     yield from single_wheel(found.terms[0].fit if _described(found) else selection.fit)  # the numbers that are shown
     yield from _on_the_cone(selection.fit.model)
@@ -254,6 +256,18 @@ def _on_moved(found: Outcome) -> Iterator[str]:
         if moved:
             said = ", ".join(f"{key} = {b['value']:.4g}{with_unit(b['unit'])}, not {a['value']:.4g}" for key, a, b in moved)
             yield f"With {' and '.join(found.negligible)} in the model, the parameters of {name} differ: {said}."
+
+
+def _on_kept(kept_for: Mapping[str, Sequence[Shift]]) -> Iterator[str]:
+    """Effects that are named though no error shows them: the data may as well be without them, and then say something else."""
+    for name, shifts in kept_for.items():
+        said = ", ".join(
+            f"{s.parameter} of {s.effect} would be {s.lacking:.3g}{with_unit(s.unit)} instead of {s.having:.3g}" for s in shifts
+        )
+        yield (
+            f"{name} is certain, but without it no error on held-out trials is higher by {LEAST_FALL:.0%} or more. It is named "
+            f"because without it {said}: measure one of these by itself to decide."
+        )
 
 
 def _inside(value: float, number: Mapping[str, Any]) -> bool:

@@ -22,7 +22,7 @@ from bns.diagnose.residuals.floor_field import imitating_floor
 from bns.diagnose.residuals.symbolic import Formula, best_formula
 from bns.diagnose.residuals.unexplained import NOTHING, Unexplained, unexplained, without_moments_explained
 from bns.diagnose.select.known_effects import known_effects
-from bns.diagnose.select.negligible import LEAST_FALL, below_noise, fall_matters, negligible, negligible_and_errors
+from bns.diagnose.select.negligible import LEAST_FALL, Shift, below_noise, fall_matters, negligible_and_errors
 from bns.diagnose.select.result import SelectionResult, certainly_lower
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import numbers_of
@@ -60,6 +60,8 @@ class Outcome:
     negligible: dict[str, dict[str, dict[str, Any]]]
     beside_negligible: dict[str, dict[str, dict[str, Any]]]
     """The numbers of the effects that stand as they are with the negligible ones in the model; empty if none is."""
+    kept_for: dict[str, tuple[Shift, ...]]
+    """Effects that no error shows, with the numbers of others that would shift without them."""
     terms: tuple[Formula, ...]
     slight: tuple[Formula, ...]
     """Terms for what is certainly left and does not count, because it is slight."""
@@ -130,7 +132,7 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
     if unseen or slight:
         stands = replace(stands, rest=NOTHING)
     whole = stands.selection
-    tiny = () if terms else _negligible(whole)
+    tiny, kept_for = ((), {}) if terms else _negligible(whole)
     selection = refitted(whole.lacking(tiny), predictor, given) if tiny else whole
     numbers = numbers_of(whole.fit) if tiny else {}
     # too few trials may show a place for its curve to be certain; it is the best guess where moments stand out
@@ -145,6 +147,7 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
         imitating,
         {name: numbers[name] for name in numbers if name in tiny},
         {name: numbers[name] for name in numbers if name in selection.accepted},
+        kept_for,
         terms,
         slight,
         unseen,
@@ -203,9 +206,12 @@ def _relative(errors: PairedErrors) -> float:
     return sum(ratios) / max(len(ratios), 1)
 
 
-def _negligible(selection: SelectionResult) -> tuple[str, ...]:
-    """As `negligible`; not asked where trials have clocks of their own."""
-    return () if selection.fit.model.per_trial_effect is not None else negligible(selection)
+def _negligible(selection: SelectionResult) -> tuple[tuple[str, ...], dict[str, tuple[Shift, ...]]]:
+    """As `negligible`, and what the others that no error shows are kept for; not asked where trials have clocks of their own."""
+    if selection.fit.model.per_trial_effect is not None:
+        return (), {}
+    tiny, _, kept_for = negligible_and_errors(selection)
+    return tiny, kept_for
 
 
 def _beside_the_floor(
@@ -310,7 +316,7 @@ def _without_negligible(found: Established, selection: SelectionResult, predicto
         return found
     own = tuple(term.name for term in found.terms)
     beside = replace(selection, problem=found.problem, fit=found.fit, accepted=(*found.names, *own))
-    tiny, errors = negligible_and_errors(beside)
+    tiny, errors, _ = negligible_and_errors(beside)
     if set(own) <= set(tiny):
         tiny = tuple(name for name in tiny if name not in own)
     faint = below_noise(errors, own)

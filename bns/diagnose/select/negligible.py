@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,6 +30,17 @@ _NO_WIDTH = DEFAULTS.report.no_width
 _ALL = "all"
 
 
+@dataclass(frozen=True)
+class Shift:
+    """A number of an effect that is another one without a second effect."""
+
+    effect: str
+    parameter: str
+    unit: str
+    having: float
+    lacking: float
+
+
 def negligible(selection: SelectionResult) -> tuple[str, ...]:
     """Accepted effects without which no held-out error is higher by `least_fall`, at any horizon; the least first.
 
@@ -39,19 +51,30 @@ def negligible(selection: SelectionResult) -> tuple[str, ...]:
     return negligible_and_errors(selection)[0]
 
 
-def negligible_and_errors(selection: SelectionResult) -> tuple[tuple[str, ...], PairedErrors | None]:
-    """As `negligible`; and the held-out errors without each of the others, and with all of these. None where none is left."""
+def negligible_and_errors(
+    selection: SelectionResult,
+) -> tuple[tuple[str, ...], PairedErrors | None, dict[str, tuple[Shift, ...]]]:
+    """As `negligible`; the held-out errors without each of the others, and with all of these (None where none is left); and which
+    of the others no error shows, each with the numbers that shift without it.
+    """
     dropped: tuple[str, ...] = ()
     while len(kept := tuple(name for name in selection.accepted if name not in dropped)):
         fits = _without_each(selection, dropped, kept)
         errors = _errors_of(selection.problem, fits)
         falls = {name: _largest_fall(errors, name, _ALL) for name in kept}
         firm = {name for name in kept if falls[name] >= LEAST_FALL}
-        tiny = [name for name in kept if name not in firm and not shifted(fits[_ALL], fits[name], firm)]
+        moved = {name: shifted(fits[_ALL], fits[name], firm) for name in kept if name not in firm}
+        tiny = [name for name, numbers in moved.items() if not numbers]
         if not tiny:
-            return dropped, errors
+            return dropped, errors, {name: _shifts(fits[_ALL], fits[name], numbers) for name, numbers in moved.items()}
         dropped = (*dropped, min(tiny, key=lambda name: falls[name]))
-    return dropped, None
+    return dropped, None, {}
+
+
+def _shifts(having: Fit, lacking: Fit, numbers: Sequence[FreeParameter]) -> tuple[Shift, ...]:
+    return tuple(
+        Shift(n.effect, n.parameter.name, n.parameter.unit, n.of(having.model), n.of(lacking.model)) for n in numbers
+    )
 
 
 def below_noise(errors: PairedErrors | None, names: Sequence[str]) -> tuple[str, ...]:
