@@ -46,9 +46,9 @@ def scatter_in_words(predictor: Predictor, noise: Array, errors: PairedErrors) -
     if explained <= EXPLAINS:
         return [
             f"The error over {IN_WORDS[horizon]} ({1e3 * error:.3g} mm) is far above tracking noise ({1e3 * floor:.3g} mm), and "
-            f"a drive that scatters as this one does from pose to pose makes only {1e3 * by_drive:.3g} mm. In the rest no "
-            "listed effect and no curve finds a pattern: trials may differ from one another, or something happens at single speeds or for "
-            "moments. Drive the same commands several times: how far these differ, no model can predict."
+            f"a drive that scatters as this one does from pose to pose makes only {1e3 * by_drive:.3g} mm. "
+            "In the rest no listed effect and no curve finds a pattern: trials may differ from one another, or something happens "
+            "at single speeds or for moments. Drive the same commands several times: how far these differ, no model can predict."
         ]
     ahead, aside, turn = 1e3 * noise[2], 1e3 * noise[3], np.degrees(noise[4])
     return [
