@@ -132,7 +132,7 @@ def open_platform(rig: Rig, clock: Clock, journal: HardwareLog, stopping: Stoppi
     try:
         with StopsAtTheEnd(chain.stop):
             chain.health()
-        eye = Eye(open_tracker(rig.tracker, clock), clock, journal, 0.0, delay_of(rig.tracker))
+        eye = Eye(open_tracker(rig.tracker, clock), clock, journal, 0.0, delay_of(rig.tracker), rig.tracker["kind"])
     except ServoError as error:
         chain.close()
         raise HardwareError(f"the servos are not fit to drive: {error}. Fix this, then try again.") from error

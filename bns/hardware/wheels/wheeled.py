@@ -76,7 +76,7 @@ class WheeledPlatform:
         stopping: Stopping,
     ) -> None:
         self._driver, self._wheels, self._clock, self._journal = driver, wheels, clock, journal
-        self._eye = Eye(tracker, clock, journal, math.pi / 2, delay_of(rig.tracker))
+        self._eye = Eye(tracker, clock, journal, math.pi / 2, delay_of(rig.tracker), rig.tracker["kind"])
         self._units = np.array([wheels.units_per_m_s, wheels.units_per_m_s, wheels.units_per_s])
         self._watch, self._disagree_s = Watch(rig.limits, clock, stopping), rig.limits.disagree_s
 
