@@ -22,6 +22,7 @@ from bns.hardware.servos.bridge_frames import (
     NO_ANSWER,
     POSITION,
     REFUSED,
+    RESTARTED,
     SERVO,
     STARTED_S,
     STATE,
@@ -33,7 +34,7 @@ from bns.hardware.servos.bridge_frames import (
     encoded,
     searched,
 )
-from bns.hardware.servos.servo_chain import Health, ServoError, ServoLimits
+from bns.hardware.servos.servo_chain import Health, RestartedServoError, ServoError, ServoLimits
 from bns.hardware.stop import Stop
 
 with extra("robot"):
@@ -111,6 +112,8 @@ class BridgeChain:
         """What every servo says, by its place from 1; ServoError if one reports an alarm or is beyond its limits."""
         found = {}
         for place, (position, load, celsius, decivolts, bits) in enumerate(SERVO.iter_unpack(self._state()), 1):
+            if bits == RESTARTED:
+                raise RestartedServoError(place, "its torque is off, or its limit is not what was set")
             if bits & NO_ANSWER:
                 raise ServoError(f"servo {place} does not answer the bridge")
             if bits:
@@ -119,6 +122,9 @@ class BridgeChain:
             found[place] = Health((position - CENTRE) * RAD_PER_STEP, share, decivolts / 10, float(celsius))
         self.limits.check(found)
         return found
+
+    def check_torque(self) -> None:
+        """Nothing is left to ask: the bridge looks at all torques whenever it is asked for the state."""
 
     def stop(self, patience_s: float = 5.0) -> Stop:
         """Torque off; confirmed when every servo has read it back, and no joint moves between two looks. Never raises.

@@ -25,6 +25,15 @@ class StuckServoError(ServoError):
         self.number = number
 
 
+class RestartedServoError(ServoError):
+    """A servo that works without the torque that it was given: it restarted, most often because its supply dipped."""
+
+    def __init__(self, number: int, lost: str) -> None:
+        super().__init__(
+            f"servo {number} has restarted: {lost}. Its supply dipped: check plugs, cables and the current that the supply can give"
+        )
+
+
 @dataclass(frozen=True)
 class Health:
     """What a servo says of itself; load is a share of the highest torque, with the sign of its direction."""
@@ -79,7 +88,13 @@ class ServoChain(Protocol):
         """Set goals and speeds of all joints; the angles really sent, after clipping, once all confirmed them."""
 
     def health(self) -> Mapping[int, Health]:
-        """What every servo says, in the order of the joints; ServoError if one reports an alarm or is beyond its limits."""
+        """What every servo says, in the order of the joints; ServoError if one reports an alarm or is beyond its limits.
+
+        From `arm` to `stop` also if one has lost its torque, as far as that takes few questions: `check_torque` asks all.
+        """
+
+    def check_torque(self) -> None:
+        """ServoError if a servo has lost the torque that it was given."""
 
     def stop(self, patience_s: float = 5.0) -> Stop:
         """Torque off, confirmed by every servo. Never raises."""

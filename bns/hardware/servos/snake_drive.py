@@ -138,6 +138,7 @@ class SnakeDrive:
             for target in angles[1:]:
                 self._posture(target)
             after_s, stable = self._in_sight(), not self._strain.stalled
+            self._chain.check_torque()
         except (OutOfSight, StuckServoError):
             self._over(cycle, (before_s, self._clock.now_s()), False, began_s, first)
             raise

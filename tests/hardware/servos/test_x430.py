@@ -124,6 +124,22 @@ def test_a_chain_arms_moves_and_stops(chain, clock, kind):
     assert not any(s.get("torque_enable") for s in bus.servos)
 
 
+def test_a_servo_that_restarts_is_found_in_turn_or_when_all_are_asked(chain):
+    driver, bus, _ = chain()
+    driver.health()
+    driver.check_torque()
+    driver.arm()
+    for _ in range(2 * len(IDS)):
+        driver.health()
+    driver.check_torque()
+    bus.servos[1].reboot()
+    with pytest.raises(ServoError, match="servo 2 has restarted: its torque is off"):
+        driver.check_torque()
+    with pytest.raises(ServoError, match="servo 2 has restarted: its torque is off"):
+        for _ in IDS:
+            driver.health()
+
+
 @pytest.mark.parametrize("kind", X430)
 def test_torque_never_comes_on_with_the_speed_that_a_servo_was_left_at(chain, kind):
     driver, bus, _ = chain(kind=kind, moving_speed=500)

@@ -18,6 +18,7 @@ from bns.hardware.servos.bridge_frames import (
     NO_ANSWER,
     POSITION,
     REFUSED,
+    RESTARTED,
     SERVO,
     STATE,
     STOP,
@@ -59,6 +60,7 @@ class BridgeEmulator:
         """Whether something was said to it while it was starting."""
         self._buffer, self._heard_s, self._byte_s = b"", clock.now_s(), clock.now_s()
         self._armed = self._starting = False
+        self._torque = 0
         self._lock = threading.Lock()
         self._answers: dict[int, Callable[[bytes], bytes | None]] = {
             HELLO: lambda _p: self._hello(),
@@ -149,7 +151,7 @@ class BridgeEmulator:
             servo.put("goal_position", servo.get("present_position"))
             servo.put("torque_limit", 1023 * payload[0] // 100)
             servo.put("torque_enable", 1)
-        self._armed = True
+        self._armed, self._torque = True, 1023 * payload[0] // 100
         return b""
 
     def _move(self, payload: bytes) -> bytes | None:
@@ -166,7 +168,9 @@ class BridgeEmulator:
         if self._faults.strikes("silent-servo", self._clock.now_s(), servo.get("id")):
             return SERVO.pack(0, 0, 0, 0, NO_ANSWER)
         names = ("present_position", "present_load", "present_temperature", "present_voltage")
-        return SERVO.pack(*(servo.get(name) for name in names), servo.errors())
+        kept = servo.get("torque_enable") and servo.get("torque_limit") == self._torque
+        bits = servo.errors() or (0 if kept or not self._armed else RESTARTED)
+        return SERVO.pack(*(servo.get(name) for name in names), bits)
 
     def _stop(self) -> bytes:
         """Torque off; bits of the servos that are silent and so may not be, and where each of the others is."""
