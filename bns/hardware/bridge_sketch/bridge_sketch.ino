@@ -184,8 +184,12 @@ void answer(uint8_t kind, uint8_t sequence, const uint8_t *payload, uint8_t coun
 }
 
 void hello(uint8_t sequence) {
-  const uint8_t who[] = {VERSION, servos};
-  answer(HELLO | ANSWER, sequence, who, sizeof who);
+  uint8_t who[2 + 4 * MOST_SERVOS] = {VERSION, servos};
+  for (uint8_t i = 0; i < servos; i++) {
+    const uint8_t limits[] = {(uint8_t)low[i], (uint8_t)(low[i] >> 8), (uint8_t)high[i], (uint8_t)(high[i] >> 8)};
+    memcpy(who + 2 + 4 * i, limits, 4);
+  }
+  answer(HELLO | ANSWER, sequence, who, 2 + 4 * servos);
 }
 
 // Answers a question; false if it makes no sense or a servo did not take it.

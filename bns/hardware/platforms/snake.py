@@ -27,6 +27,7 @@ from bns.hardware.servos.snake_settings import SnakeSettings, snake_settings
 from bns.hardware.stop import Stop
 from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.kinds import DELAY, checked, delay_of, open_tracker
+from bns.physics.snake.gait import GREATEST_RAD
 
 REPEATS = 3
 """How often a trial drives its final controller by default: the dissertation drove it three times (section 5.7)."""
@@ -120,8 +121,8 @@ class SnakePlatform:
 def open_chain(port: str, settings: SnakeSettings, clock: Clock, journal: HardwareLog) -> ServoChain:
     """The servos as a rig's settings say that they are wired; HardwareError names who is missing."""
     if settings.wiring == "bridge":
-        return BridgeChain(port, len(settings.ids), clock, journal, settings.limits)
-    return DynamixelChain(port, settings.ids, clock, journal, settings.limits, settings.table)
+        return BridgeChain(port, len(settings.ids), clock, journal, settings.limits, GREATEST_RAD)
+    return DynamixelChain(port, settings.ids, clock, journal, settings.limits, settings.table, GREATEST_RAD)
 
 
 def open_platform(rig: Rig, clock: Clock, journal: HardwareLog, stopping: Stopping) -> SnakePlatform:

@@ -14,6 +14,7 @@ from bns.hardware.link.serial_link import open_port
 from bns.hardware.link.terminal_error import TerminalError
 from bns.hardware.servos.ax12_table import AX12, CENTRE, RAD_PER_STEP, RAD_S_PER_STEP, errors_in
 from bns.hardware.servos.bridge_frames import (
+    ANGLES,
     ANSWER,
     ARM,
     GOAL,
@@ -34,7 +35,7 @@ from bns.hardware.servos.bridge_frames import (
     encoded,
     searched,
 )
-from bns.hardware.servos.servo_chain import Health, RestartedServoError, ServoError, ServoLimits
+from bns.hardware.servos.servo_chain import Health, RestartedServoError, ServoError, ServoLimits, narrow
 from bns.hardware.stop import Stop
 
 with extra("robot"):
@@ -57,11 +58,20 @@ _WHY = {
 
 
 class BridgeChain:
-    """Driver of `count` servos behind a bridge. Opening checks the bridge's version and how many servos it has found."""
+    """Driver of `count` servos behind a bridge. Opening checks the bridge's version, how many servos it has found, and that
+    their angle limits leave `reach_rad` to both sides."""
 
     step_rad = RAD_PER_STEP
 
-    def __init__(self, port: str, count: int, clock: Clock, journal: HardwareLog, limits: ServoLimits | None = None) -> None:
+    def __init__(
+        self,
+        port: str,
+        count: int,
+        clock: Clock,
+        journal: HardwareLog,
+        limits: ServoLimits | None = None,
+        reach_rad: float = 0.0,
+    ) -> None:
         self._clock, self._journal, self.count = clock, journal, count
         self.limits = limits or ServoLimits()
         self._sequence, self.retries = 0, 0
@@ -69,7 +79,7 @@ class BridgeChain:
         self._serial: serial.Serial | None = None
         try:
             self._open()
-            version, found = self._ask(HELLO, b"", 2)
+            version, found, *limits_of = self._ask(HELLO, b"", None)
         except ServoError as error:
             self.close()
             raise HardwareError(f"no bridge answers at {port} ({error}). Is its sketch loaded, is it powered?") from error
@@ -79,6 +89,10 @@ class BridgeChain:
                 f"the bridge speaks version {version} and has found {found} servos; version {VERSION} and {count} servos are "
                 "needed. Load the sketch of this bns; check cables and ids."
             )
+        pairs = enumerate(ANGLES.iter_unpack(bytes(limits_of)), 1)
+        if wrong := [why for place, pair in pairs if (why := narrow(place, pair, AX12, reach_rad))]:
+            self.close()
+            raise HardwareError("; ".join(wrong) + ". With the servos on a bus adapter, bns servos check --fix sets them.")
 
     def _open(self) -> None:
         """Open the port, and say nothing until the board has said hello or cannot be starting any more (see `STARTED_S`)."""
@@ -160,8 +174,10 @@ class BridgeChain:
         self._journal.note("stop", **asdict(stop))
         return stop
 
-    def _ask(self, kind: int, payload: bytes, size: int, attempts: int = ATTEMPTS, timeout_s: float = _TIMEOUT_S) -> bytes:
-        """Payload of the answer, of that size; asked again when nothing or something else comes."""
+    def _ask(
+        self, kind: int, payload: bytes, size: int | None, attempts: int = ATTEMPTS, timeout_s: float = _TIMEOUT_S
+    ) -> bytes:
+        """Payload of the answer, of that size (None: of any); asked again when nothing or something else comes."""
         problem = ""
         for attempt in range(attempts):
             self.retries += attempt > 0
@@ -171,7 +187,7 @@ class BridgeChain:
             except (OSError, TerminalError, HardwareError) as error:
                 self._lose(error)
                 raise ServoError(f"the port is gone ({error})") from error
-            if answer is not None and answer.kind == kind | ANSWER and len(answer.payload) == size:
+            if answer is not None and answer.kind == kind | ANSWER and size in {None, len(answer.payload)}:
                 return answer.payload
             problem = "no answer" if answer is None else f"the answer was {answer}"
             if answer is not None and answer.kind == REFUSED | ANSWER:

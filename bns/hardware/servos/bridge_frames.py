@@ -26,6 +26,8 @@ GOAL = struct.Struct("<HH")
 """Goal position and moving speed of one servo, in its own units."""
 SERVO = struct.Struct("<HHBBB")
 """Position, load, temperature (°C), voltage (0.1 V) and error byte of one servo."""
+ANGLES = struct.Struct("<HH")
+"""Angle limits of one servo, in the answer to a hello."""
 STOPPED = 2
 """Bytes at the beginning of the answer to a stop: a bit for each servo that was not read back with its torque off."""
 POSITION = struct.Struct("<H")

@@ -18,7 +18,14 @@ from bns.hardware.link.terminal_error import TerminalError
 from bns.hardware.servos.ax12_table import AX12
 from bns.hardware.servos.dynamixel_port import ClockedPort
 from bns.hardware.servos.packets import BROADCAST
-from bns.hardware.servos.servo_chain import Health, RestartedServoError, ServoAlarmError, ServoError, ServoLimits
+from bns.hardware.servos.servo_chain import (
+    Health,
+    RestartedServoError,
+    ServoAlarmError,
+    ServoError,
+    ServoLimits,
+    narrow,
+)
 from bns.hardware.servos.servo_models import name_of
 from bns.hardware.servos.servo_table import BAUD, ServoTable
 from bns.hardware.stop import Stop
@@ -35,7 +42,8 @@ _REBOOTS_S = 0.5
 
 
 class DynamixelChain:
-    """Driver of servos `ids` in the order of the joints. Opening checks that each is there, once, and of the table's model."""
+    """Driver of servos `ids` in the order of the joints. Opening checks that each is there, once, of the table's model, and that
+    its angle limits leave `reach_rad` to both sides."""
 
     def __init__(
         self,
@@ -45,10 +53,11 @@ class DynamixelChain:
         journal: HardwareLog,
         limits: ServoLimits | None = None,
         table: ServoTable = AX12,
+        reach_rad: float = 0.0,
     ) -> None:
         self.ids, self._clock, self._journal = tuple(ids), clock, journal
         self.limits, self.table = limits or ServoLimits(), table
-        self.step_rad = table.rad_per_step
+        self.step_rad, self._reach_rad = table.rad_per_step, reach_rad
         self.retries = 0
         self._limits_of: dict[int, tuple[int, int]] = {}
         self._armed, self._turn = False, 0
@@ -64,6 +73,12 @@ class DynamixelChain:
         if wrong and not self._port.echoes:
             self._port.find_echo()
             wrong = self._all_that_is_wrong() if self._port.echoes else wrong
+        if len(self.ids) > 1 and len(wrong) == len(self.ids) and all(" is missing (" in text for text in wrong):
+            self.close()
+            raise HardwareError(
+                f"none of the {len(wrong)} servos answers at {self._port.port_name} ({self.table.model}, {BAUD} baud). Is their "
+                "supply on, is the adapter connected to them, are model and baud rate right? bns servos scan lists who answers."
+            )
         if wrong:
             self.close()
             raise HardwareError("; ".join(wrong) + ". Check cables, power and ids (bns servos scan lists who answers).")
@@ -90,8 +105,9 @@ class DynamixelChain:
         for name in self.table.needed:
             if (value := self.read(number, name)) != self.table.wanted[name]:
                 return f"servo {number} has {name} {value}, not {self.table.wanted[name]} (bns servos check --fix sets it)"
-        self._angle_limits(number)  # now: behind a slow adapter it would hold up the first look at a robot that moves
-        return ""
+        # The limits now: behind a slow adapter they would hold up the first look at a robot that moves.
+        why = narrow(number, self._angle_limits(number), self.table, self._reach_rad)
+        return f"{why} (bns servos check --fix sets them)" if why else ""
 
     def _comes_twice(self, number: int) -> bool:
         self.read(number, "model_number")

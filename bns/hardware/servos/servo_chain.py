@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from bns.hardware.servos.servo_table import ServoTable
 from bns.hardware.stop import Stop
 
 
@@ -30,7 +32,7 @@ class RestartedServoError(ServoError):
 
     def __init__(self, number: int, lost: str) -> None:
         super().__init__(
-            f"servo {number} has restarted: {lost}. Its supply dipped: check plugs, cables and the current that the supply can give"
+            f"servo {number} has restarted: {lost}. Its supply dipped: check plugs, cables and what current the supply can give"
         )
 
 
@@ -42,6 +44,22 @@ class Health:
     load: float
     voltage_v: float
     temperature_c: float
+
+
+def narrow(number: int, limits: tuple[int, int], table: ServoTable, reach_rad: float) -> str:
+    """What is wrong with a servo's angle limits where its joint is to reach so far to both sides, or nothing.
+
+    With both at 0, an AX-12 is in wheel mode: it takes a speed for its motor's power, and turns without end.
+    """
+    low, high = limits
+    if low == high == 0 and table.protocol == 1:
+        return f"servo {number} is in wheel mode: both its angle limits are 0, so it would turn without end"
+    reach = reach_rad / table.rad_per_step
+    if low <= table.centre - reach and high >= table.centre + reach - 1:
+        return ""
+    least, most = math.floor(table.centre - reach), math.ceil(table.centre + reach - 1)
+    needs = f"a gait needs {least} to {most}, {math.degrees(reach_rad):.0f}° to both sides"
+    return f"servo {number} has the angle limits {low} to {high}; {needs}"
 
 
 @dataclass(frozen=True)

@@ -75,7 +75,7 @@ class Eye:
         if isinstance(error, HardwareError):
             return TrialPausedError(f"{self._called}: {error}")
         said = f"{type(error).__name__}: {error}"
-        return TrialPausedError(f"{self._called} failed ({said}). Mend it, and see that bns track shows the robot")
+        return TrialPausedError(f"{self._called} failed ({said}). Repair that, and see that bns track shows the robot")
 
     def look(self) -> Sight | None:
         """A sight newer than the last, with the time at which it was filmed; None if there is none.

@@ -531,3 +531,14 @@ def test_an_emulated_servo_restarts_as_the_manual_says(clock):
     assert [servo.get(name) for name in kept] == [3, 900, 0, 700, 0]
     assert servo.get("goal_position") == servo.get("present_position")
     assert not servo.errors()
+
+
+def test_a_servo_in_wheel_mode_does_not_move(chain):
+    with pytest.raises(HardwareError, match=r"servo 2 is in wheel mode.*would turn without end .bns servos check --fix sets"):
+        chain(prepare=lambda bus: bus.servos[1].put("ccw_angle_limit", 0))
+
+
+def test_that_no_servo_answers_is_said_once(chain):
+    with pytest.raises(HardwareError, match=r"^none of the 3 servos answers at .*supply.*bns servos scan") as said:
+        chain(asked=(7, 8, 9))
+    assert "servo 8" not in str(said.value)

@@ -10,6 +10,7 @@ from bns.hardware.clock import EmulatedClock
 from bns.hardware.emulators.devices.servo import Servo
 from bns.hardware.emulators.faults import Faults
 from bns.hardware.servos.bridge_frames import (
+    ANGLES,
     ANSWER,
     ARM,
     GOAL,
@@ -138,7 +139,8 @@ class BridgeEmulator:
         return encoded(Frame(kind | ANSWER, frame.sequence, payload or b""))
 
     def _hello(self) -> bytes:
-        return bytes([VERSION, len(self.servos)])
+        limits = (ANGLES.pack(s.get("cw_angle_limit"), s.get("ccw_angle_limit")) for s in self.servos)
+        return bytes([VERSION, len(self.servos)]) + b"".join(limits)
 
     def _nothing(self) -> bytes:
         self._clock.fell_silent()
