@@ -142,7 +142,7 @@ class Servo:
         return found if self.kind.protocol == 1 else self.kind.alarm_bits * bool(found)
 
     def reboot(self) -> None:
-        """As if it were switched off and on: what is not kept is as after a reset, the limit at its highest, the goal its place."""
+        """As if it were switched off and on: what is not kept is as after a reset, the torque limit is at its highest."""
         for name, register in self.kind.registers.items():
             if register.address >= self.kind.registers["torque_enable"].address and not name.startswith("present"):
                 self.put(name, register.default)
