@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext, suppress
@@ -33,6 +34,14 @@ REPEATED = "repeat-"
 
 Stuck = tuple[str, tuple[tuple[str, int], ...], str]
 """A drive that could not go on, as in the journal: before the kind of event, its numbers, what was stuck."""
+
+
+def leaps_text(count: int) -> str:
+    """That so many poses cannot be, and what to look for; nothing if there are none."""
+    if not count:
+        return ""
+    which = "1 pose is" if count == 1 else f"{count} poses are"
+    return f"{which} further from the one before than the robot can drive (a false marker, a push?); bns track shows what is seen"
 
 
 @dataclass(frozen=True)
@@ -77,6 +86,8 @@ class TrialDriver:
         self.readings: dict[str, float] = {}
         self.stops_s: list[float] = []
         self.ends: list[str] = []
+        self.leaps = 0
+        """Poses of all drives that the robot cannot have reached."""
         self.marked: int | None = None
         """How many commands were called unstable in the last evaluation; None for a robot whose commands cannot be."""
 
@@ -172,6 +183,10 @@ class TrialDriver:
         self.stops_s.append(driven.stop.seconds)
         if driven.ended:
             self.ends.append(driven.ended)
+        if driven.leaps:
+            self.leaps += driven.leaps
+            with self.suspended():
+                print(f"{purpose.text}: {leaps_text(driven.leaps)}", file=sys.stderr)
         self._note(
             purpose,
             "driven",
@@ -182,6 +197,7 @@ class TrialDriver:
             ended=driven.ended,
             session_s=session_s,
             readings=self.readings,
+            leaps=driven.leaps,
         )
         self._log.sync()
         return driven

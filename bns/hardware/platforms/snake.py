@@ -49,7 +49,7 @@ class SnakePlatform:
     ) -> None:
         self._chain, self._eye, self._settings = chain, eye, settings
         self._clock, self._journal = clock, journal
-        self._watch = Watch(rig.limits, clock, stopping)
+        self._watch, self._disagree_s = Watch(rig.limits, clock, stopping), rig.limits.disagree_s
         self._unknown_s = KNOWN_S if DELAY in rig.tracker else UNKNOWN_S
 
     @property
@@ -81,7 +81,7 @@ class SnakePlatform:
 
     def _new_drive(self) -> SnakeDrive:
         return SnakeDrive(
-            self._chain, self._eye, self._watch, self._settings, self._clock, self._journal, self._unknown_s
+            self._chain, self._eye, self._watch, self._settings, self._clock, self._journal, self._unknown_s, self._disagree_s
         )
 
     def move_about(self, seconds: float) -> Motion:
@@ -115,7 +115,8 @@ class SnakePlatform:
                 ended, stuck = str(error), f"servo {error.number}"
         assert guard.last is not None
         seconds = self._clock.now_s() - began_s
-        return Driven(drive.done(), drive.observed(), drive.rows, guard.last, ended, seconds, drive.spans_s, stuck)
+        leaps, spans_s = drive.leaps.count, drive.spans_s
+        return Driven(drive.done(), drive.observed(), drive.rows, guard.last, ended, seconds, spans_s, stuck, leaps)
 
 
 def open_chain(port: str, settings: SnakeSettings, clock: Clock, journal: HardwareLog) -> ServoChain:

@@ -141,4 +141,4 @@ class WheeledPlatform:
         assert guard.last is not None
         seconds = self._clock.now_s() - began_s
         done = (drive.carried() * self._units).astype(np.float32)
-        return Driven(done, drive.poses(), drive.rows(), guard.last, ended, seconds)
+        return Driven(done, drive.poses(), drive.rows(), guard.last, ended, seconds, leaps=drive.leaps.count)
