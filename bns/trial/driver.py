@@ -86,6 +86,7 @@ class TrialDriver:
         self.readings: dict[str, float] = {}
         self.stops_s: list[float] = []
         self.ends: list[str] = []
+        self._last_end = ""
         self.leaps = 0
         """Poses of all drives that the robot cannot have reached."""
         self.marked: int | None = None
@@ -181,6 +182,7 @@ class TrialDriver:
         finally:
             self.underway.ends()
         self.stops_s.append(driven.stop.seconds)
+        self._last_end = driven.ended
         if driven.ended:
             self.ends.append(driven.ended)
         if driven.leaps:
@@ -251,7 +253,8 @@ class TrialDriver:
     def _misplaced(self, void: int) -> str | None:
         pose = self._platform.pose()
         if pose is None:
-            return "The tracker does not see the robot"
+            last = f" (the last drive ended because {self._last_end})" if self._last_end else ""
+            return f"The tracker does not see the robot{last}"
         off_m = float(np.hypot(*(pose[:2] - self.start[:2])))
         if off_m > self._rig.placed_within_m:
             return f"The robot stands {100 * off_m:.0f} cm from its start"
