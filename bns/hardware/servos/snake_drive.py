@@ -71,7 +71,7 @@ class SnakeDrive:
         self._between = self._parameters.joints_between_markers
         self.leaps, self._disagree_s = Leaps(), disagree_s
         # A joint at one end that turns as fast as it may swings the body about it, and the middle of the markers at half their
-        # distance: at 0.96 m/s with the shipped numbers. In twelve drives of the model it moved at 0.42 m/s at most; a robot that
+        # distance: at 0.49 m/s with the shipped rig. In twelve drives of the model it moved at 0.42 m/s at most; a robot that
         # rolls over is faster than half of that.
         self._fastest_m_s = settings.joint_speed_rad_s * self._parameters.marker_gap_m / 2.0
         self._shape, self._apart = SameScene(_STILL_M), list[tuple[float, float]]()
