@@ -18,9 +18,11 @@ from bns.hardware.doctor import Finding, latency_of
 from bns.hardware.link.terminal_error import TerminalError
 from bns.hardware.servos.ax12_table import AX12
 from bns.hardware.servos.dynamixel_port import ClockedPort
+from bns.hardware.servos.servo_chain import narrow
 from bns.hardware.servos.servo_models import TABLES, name_of, table_of
 from bns.hardware.servos.servo_table import BAUD, ServoTable
 from bns.hardware.servos.snake_settings import limits_of
+from bns.physics.snake.gait import GREATEST_RAD
 
 with extra("robot"):
     from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, PacketHandler
@@ -31,7 +33,6 @@ _MOST_DELAY = 25
 """A return delay of 50 µs: above it, a round of twelve servos takes milliseconds longer for nothing."""
 _EEPROM_S = 0.02
 _SURE = 3
-_QUARTER_RAD = 1.5707963267948966
 _NAMES = {"return_delay": "return delay", "status_return": "status return level"}
 
 
@@ -142,8 +143,7 @@ class ServoBus:
                 shown = f"{2 * value} µs" if what == "return_delay" else str(value)
                 yield Finding(good, f"servo {number}: {_NAMES.get(what, what.replace('_', ' '))} {shown}", "" if good else mend)
         low, high = self.read(servo, "cw_angle_limit"), self.read(servo, "ccw_angle_limit")
-        reach = _QUARTER_RAD / table.rad_per_step
-        wide = low <= table.centre - reach and high >= table.centre + reach - 1
+        wide = not narrow(number, (low, high), table, GREATEST_RAD)
         yield Finding(wide, f"servo {number}: angle limits {low} to {high}", "" if wide else f"90° to both sides: {mend}")
         volts, limits = self.read(servo, "present_voltage") / 10, limits_of(table)
         fed = limits.low_v <= volts <= limits.high_v

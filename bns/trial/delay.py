@@ -23,7 +23,12 @@ def measured_delay(how: TrialSetup, seconds: float = SECONDS, seed: int = 0) -> 
             )
         if not (how.yes or how.emulated):
             what = _SNAKE if how.rig.robot == "snake" else _WHEELS
-            stopping.ask(f"The robot will {what} for {seconds:g} s; Enter: ")
+            try:
+                stopping.ask(f"The robot will {what} for {seconds:g} s; Enter: ")
+            except EOFError as error:
+                raise HardwareError(
+                    "there is nobody to ask before the robot moves: the input has ended. Run it at a terminal."
+                ) from error
         return delay_between(move_about(seconds), delay_of(how.rig.tracker))
 
 

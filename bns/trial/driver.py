@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext, suppress
@@ -33,6 +34,14 @@ REPEATED = "repeat-"
 
 Stuck = tuple[str, tuple[tuple[str, int], ...], str]
 """A drive that could not go on, as in the journal: before the kind of event, its numbers, what was stuck."""
+
+
+def leaps_text(count: int) -> str:
+    """That so many poses cannot be, and what to look for; nothing if there are none."""
+    if not count:
+        return ""
+    which = "1 pose is" if count == 1 else f"{count} poses are"
+    return f"{which} further from the one before than the robot can drive (a false marker, a push?); bns track shows what is seen"
 
 
 @dataclass(frozen=True)
@@ -77,6 +86,9 @@ class TrialDriver:
         self.readings: dict[str, float] = {}
         self.stops_s: list[float] = []
         self.ends: list[str] = []
+        self._last_end = ""
+        self.leaps = 0
+        """Poses of all drives that the robot cannot have reached."""
         self.marked: int | None = None
         """How many commands were called unstable in the last evaluation; None for a robot whose commands cannot be."""
 
@@ -170,8 +182,13 @@ class TrialDriver:
         finally:
             self.underway.ends()
         self.stops_s.append(driven.stop.seconds)
+        self._last_end = driven.ended
         if driven.ended:
             self.ends.append(driven.ended)
+        if driven.leaps:
+            self.leaps += driven.leaps
+            with self.suspended():
+                print(f"{purpose.text}: {leaps_text(driven.leaps)}", file=sys.stderr)
         self._note(
             purpose,
             "driven",
@@ -182,6 +199,7 @@ class TrialDriver:
             ended=driven.ended,
             session_s=session_s,
             readings=self.readings,
+            leaps=driven.leaps,
         )
         self._log.sync()
         return driven
@@ -235,7 +253,8 @@ class TrialDriver:
     def _misplaced(self, void: int) -> str | None:
         pose = self._platform.pose()
         if pose is None:
-            return "The tracker does not see the robot"
+            last = f" (the last drive ended because {self._last_end})" if self._last_end else ""
+            return f"The tracker does not see the robot{last}"
         off_m = float(np.hypot(*(pose[:2] - self.start[:2])))
         if off_m > self._rig.placed_within_m:
             return f"The robot stands {100 * off_m:.0f} cm from its start"

@@ -14,7 +14,7 @@ from bns.hardware.rig import surface_text
 from bns.hardware.safety import Stopping
 from bns.robots import load_robot
 from bns.robots.base import Robot, on_floor
-from bns.trial.driver import TrialDriver
+from bns.trial.driver import TrialDriver, leaps_text
 from bns.trial.folder import (
     JOURNAL,
     MEASUREMENTS,
@@ -139,7 +139,8 @@ def _driven(trials: list[tuple[np.ndarray, np.ndarray]], how: TrialSetup, journa
     rows = len(measured(journal))
     faults = f"\n{opened.plan.outcome()}" if opened.plan.faults else ""
     many, kept = count_of(len(trials), "trial"), journal.with_name(MEASUREMENTS)
-    return f"{many} driven{ended}; {rows} rows of measurements in {kept}{faults}"
+    leaps = f"\n{leaps_text(driver.leaps)}" if driver.leaps else ""
+    return f"{many} driven{ended}; {rows} rows of measurements in {kept}{leaps}{faults}"
 
 
 def _driven_before(journal: Path, trials: list[np.ndarray], resume: bool) -> int:

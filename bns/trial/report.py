@@ -20,7 +20,8 @@ class TrialResult:
     waited for computations; worked_share: of the time, in which training and evolution went on; rounds: of these, while it
     drove; wall_s: how long it took;
     repeats: success of each drive of the final controller, if it was driven more than once; faults: which of the faults that
-    were planned for an emulated robot have happened, in words ("" if none was planned).
+    were planned for an emulated robot have happened, in words ("" if none was planned); leaps: how many poses the robot cannot
+    have reached, in words ("" if there are none).
     """
 
     run: RunResult
@@ -33,6 +34,7 @@ class TrialResult:
     wall_s: float
     repeats: list[bool] = field(default_factory=list)
     faults: str = ""
+    leaps: str = ""
 
 
 def report(spec: RunSpec, result: TrialResult, what: str) -> list[str]:
@@ -51,7 +53,7 @@ def report(spec: RunSpec, result: TrialResult, what: str) -> list[str]:
         f"the robot waited for computations {result.waited_share:.1%} of the time; training and evolution used "
         f"{result.worked_share:.0%} of it, in {result.rounds} rounds",
         _stops(result.stops_s),
-        *filter(None, (early, result.faults)),
+        *filter(None, (early, result.leaps, result.faults)),
         *_repeats(result.repeats),
     ]
 

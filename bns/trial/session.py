@@ -32,7 +32,7 @@ from bns.sweep.single_run import keep_run
 from bns.tasks import load_task
 from bns.trial.again.repeats import drive_repeats, final_evaluation, repeats_table, write_repeats
 from bns.trial.background import BackgroundDriver
-from bns.trial.driver import TrialDriver
+from bns.trial.driver import TrialDriver, leaps_text
 from bns.trial.evaluation import Evaluation
 from bns.trial.folder import (
     PICTURE,
@@ -181,7 +181,7 @@ def _driven(
             result = _looped(spec, how, driver, past, started, on_evaluation)
             _repeated(spec, how, driver, folder, result)
             opened.log.note("complete", evaluations=len(result.run.tables["evals"]["evaluation"]))
-            result = replace(result, faults=opened.plan.outcome())
+            result = replace(result, faults=opened.plan.outcome(), leaps=leaps_text(driver.leaps))
     except HardwareError:
         if not past:  # nothing has moved: the next attempt is no resumption
             forget_unless(folder.journal, "trial")

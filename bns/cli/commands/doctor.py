@@ -19,5 +19,6 @@ def checked_up(options: argparse.Namespace) -> int:
     for finding in examine(rig, RealClock()):
         print(finding, flush=True)
         bad += not finding.fine
-    print("all fine" if not bad else f"{bad} to be fixed")
+    fine = "all fine" if rig is not None else "all fine at this computer; no robot and no tracker was checked: give --rig FILE"
+    print(fine if not bad else f"{bad} to be fixed")
     return 2 if bad else 0

@@ -7,17 +7,17 @@
 
 const uint8_t DIRECTION = 2;
 const uint8_t MOST_SERVOS = 16;
-const uint8_t VERSION = 3;
+const uint8_t VERSION = 4;
 const uint32_t WATCHDOG_MS = 500, TORN_MS = 50, RAMP_MS = 50, ANSWER_US = 3000;
 
 const uint8_t START = 0xA5, HELLO = 1, ARM = 2, MOVE = 3, STATE = 4, STOP = 5, ANSWER = 0x80, REFUSED = 0xFF;
-const uint8_t NO_ANSWER = 0x80;  // in a servo's error byte
+const uint8_t NO_ANSWER = 0x80, RESTARTED = 0xC0;  // in a servo's error byte
 
 // Control table of the AX-12.
 const uint8_t ANGLE_LIMITS = 6, TORQUE_ENABLE = 24, GOAL = 30, TORQUE_LIMIT = 34, POSITION = 36;
 // Instructions of its protocol. Beware of short names: those of the chip's registers (PING is port G's) are macros.
 const uint8_t READ = 2, WRITE = 3, BROADCAST = 254;
-const uint8_t RAMP_STEPS = 4, TRIES = 3, LONGEST_STATUS = 6 + 16;
+const uint8_t RAMP_STEPS = 4, TRIES = 3, LONGEST_STATUS = 6 + 20;
 
 uint8_t frame[4 + 255 + 2], back[7 * MOST_SERVOS], servos = 0, ramp = RAMP_STEPS, grown = 0;
 uint16_t held = 0, low[MOST_SERVOS], high[MOST_SERVOS], torque = 0;
@@ -184,8 +184,12 @@ void answer(uint8_t kind, uint8_t sequence, const uint8_t *payload, uint8_t coun
 }
 
 void hello(uint8_t sequence) {
-  const uint8_t who[] = {VERSION, servos};
-  answer(HELLO | ANSWER, sequence, who, sizeof who);
+  uint8_t who[2 + 4 * MOST_SERVOS] = {VERSION, servos};
+  for (uint8_t i = 0; i < servos; i++) {
+    const uint8_t limits[] = {(uint8_t)low[i], (uint8_t)(low[i] >> 8), (uint8_t)high[i], (uint8_t)(high[i] >> 8)};
+    memcpy(who + 2 + 4 * i, limits, 4);
+  }
+  answer(HELLO | ANSWER, sequence, who, 2 + 4 * servos);
 }
 
 // Answers a question; false if it makes no sense or a servo did not take it.
@@ -207,8 +211,12 @@ bool understood(uint8_t kind, uint8_t sequence, uint8_t *payload, uint8_t count)
     answer(kind | ANSWER, sequence, payload, count);
   } else if (kind == STATE && count == 0) {
     for (uint8_t i = 0; i < servos; i++) {
-      uint8_t now[8] = {0};  // position, speed, load, voltage, temperature
-      const int error = readTable(i + 1, POSITION, now, 8);
+      uint8_t all[POSITION + 8 - TORQUE_ENABLE] = {0};  // torque first; last position, speed, load, voltage, temperature
+      const uint8_t *now = all + POSITION - TORQUE_ENABLE;
+      int error = readTable(i + 1, TORQUE_ENABLE, all, sizeof all);
+      // A servo that restarts has its torque off, or on again with the next goal, and the highest limit that it allows.
+      const bool kept = all[0] && word16(all + TORQUE_LIMIT - TORQUE_ENABLE) == torque;
+      if (error == 0 && armed && ramp >= RAMP_STEPS && !kept) error = RESTARTED;
       const uint8_t told[] = {now[0], now[1], now[4], now[5], now[7], now[6], error < 0 ? NO_ANSWER : (uint8_t)error};
       memcpy(back + 7 * i, told, 7);
     }

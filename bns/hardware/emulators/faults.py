@@ -38,6 +38,7 @@ KINDS: Mapping[str, str] = {
     "swapped-markers": "lights change places in the report",
     "reflection": "a light that is no marker appears",
     "silent-servo": "one servo does not answer",
+    "restart": "a servo restarts, as when its supply dips: torque off, the torque limit at its highest",
     "overload": "a servo shuts down by overload",
     "overheat": "a servo's temperature rises beyond its limit",
 }

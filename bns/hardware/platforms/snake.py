@@ -27,6 +27,7 @@ from bns.hardware.servos.snake_settings import SnakeSettings, snake_settings
 from bns.hardware.stop import Stop
 from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.kinds import DELAY, checked, delay_of, open_tracker
+from bns.physics.snake.gait import GREATEST_RAD
 
 REPEATS = 3
 """How often a trial drives its final controller by default: the dissertation drove it three times (section 5.7)."""
@@ -48,7 +49,7 @@ class SnakePlatform:
     ) -> None:
         self._chain, self._eye, self._settings = chain, eye, settings
         self._clock, self._journal = clock, journal
-        self._watch = Watch(rig.limits, clock, stopping)
+        self._watch, self._disagree_s = Watch(rig.limits, clock, stopping), rig.limits.disagree_s
         self._unknown_s = KNOWN_S if DELAY in rig.tracker else UNKNOWN_S
 
     @property
@@ -80,7 +81,7 @@ class SnakePlatform:
 
     def _new_drive(self) -> SnakeDrive:
         return SnakeDrive(
-            self._chain, self._eye, self._watch, self._settings, self._clock, self._journal, self._unknown_s
+            self._chain, self._eye, self._watch, self._settings, self._clock, self._journal, self._unknown_s, self._disagree_s
         )
 
     def move_about(self, seconds: float) -> Motion:
@@ -114,14 +115,15 @@ class SnakePlatform:
                 ended, stuck = str(error), f"servo {error.number}"
         assert guard.last is not None
         seconds = self._clock.now_s() - began_s
-        return Driven(drive.done(), drive.observed(), drive.rows, guard.last, ended, seconds, drive.spans_s, stuck)
+        leaps, spans_s = drive.leaps.count, drive.spans_s
+        return Driven(drive.done(), drive.observed(), drive.rows, guard.last, ended, seconds, spans_s, stuck, leaps)
 
 
 def open_chain(port: str, settings: SnakeSettings, clock: Clock, journal: HardwareLog) -> ServoChain:
     """The servos as a rig's settings say that they are wired; HardwareError names who is missing."""
     if settings.wiring == "bridge":
-        return BridgeChain(port, len(settings.ids), clock, journal, settings.limits)
-    return DynamixelChain(port, settings.ids, clock, journal, settings.limits, settings.table)
+        return BridgeChain(port, len(settings.ids), clock, journal, settings.limits, GREATEST_RAD)
+    return DynamixelChain(port, settings.ids, clock, journal, settings.limits, settings.table, GREATEST_RAD)
 
 
 def open_platform(rig: Rig, clock: Clock, journal: HardwareLog, stopping: Stopping) -> SnakePlatform:
@@ -132,7 +134,7 @@ def open_platform(rig: Rig, clock: Clock, journal: HardwareLog, stopping: Stoppi
     try:
         with StopsAtTheEnd(chain.stop):
             chain.health()
-        eye = Eye(open_tracker(rig.tracker, clock), clock, journal, 0.0, delay_of(rig.tracker))
+        eye = Eye(open_tracker(rig.tracker, clock), clock, journal, 0.0, delay_of(rig.tracker), rig.tracker["kind"])
     except ServoError as error:
         chain.close()
         raise HardwareError(f"the servos are not fit to drive: {error}. Fix this, then try again.") from error

@@ -14,6 +14,7 @@ from bns.hardware.link.serial_link import open_port
 from bns.hardware.link.terminal_error import TerminalError
 from bns.hardware.servos.ax12_table import AX12, CENTRE, RAD_PER_STEP, RAD_S_PER_STEP, errors_in
 from bns.hardware.servos.bridge_frames import (
+    ANGLES,
     ANSWER,
     ARM,
     GOAL,
@@ -22,6 +23,7 @@ from bns.hardware.servos.bridge_frames import (
     NO_ANSWER,
     POSITION,
     REFUSED,
+    RESTARTED,
     SERVO,
     STARTED_S,
     STATE,
@@ -33,7 +35,7 @@ from bns.hardware.servos.bridge_frames import (
     encoded,
     searched,
 )
-from bns.hardware.servos.servo_chain import Health, ServoError, ServoLimits
+from bns.hardware.servos.servo_chain import Health, RestartedServoError, ServoError, ServoLimits, narrow
 from bns.hardware.stop import Stop
 
 with extra("robot"):
@@ -56,11 +58,20 @@ _WHY = {
 
 
 class BridgeChain:
-    """Driver of `count` servos behind a bridge. Opening checks the bridge's version and how many servos it has found."""
+    """Driver of `count` servos behind a bridge. Opening checks the bridge's version, how many servos it has found, and that
+    their angle limits leave `reach_rad` to both sides."""
 
     step_rad = RAD_PER_STEP
 
-    def __init__(self, port: str, count: int, clock: Clock, journal: HardwareLog, limits: ServoLimits | None = None) -> None:
+    def __init__(
+        self,
+        port: str,
+        count: int,
+        clock: Clock,
+        journal: HardwareLog,
+        limits: ServoLimits | None = None,
+        reach_rad: float = 0.0,
+    ) -> None:
         self._clock, self._journal, self.count = clock, journal, count
         self.limits = limits or ServoLimits()
         self._sequence, self.retries = 0, 0
@@ -68,7 +79,7 @@ class BridgeChain:
         self._serial: serial.Serial | None = None
         try:
             self._open()
-            version, found = self._ask(HELLO, b"", 2)
+            version, found, *limits_of = self._ask(HELLO, b"", None)
         except ServoError as error:
             self.close()
             raise HardwareError(f"no bridge answers at {port} ({error}). Is its sketch loaded, is it powered?") from error
@@ -78,6 +89,10 @@ class BridgeChain:
                 f"the bridge speaks version {version} and has found {found} servos; version {VERSION} and {count} servos are "
                 "needed. Load the sketch of this bns; check cables and ids."
             )
+        pairs = enumerate(ANGLES.iter_unpack(bytes(limits_of)), 1)
+        if wrong := [why for place, pair in pairs if (why := narrow(place, pair, AX12, reach_rad))]:
+            self.close()
+            raise HardwareError("; ".join(wrong) + ". With the servos on a bus adapter, bns servos check --fix sets them.")
 
     def _open(self) -> None:
         """Open the port, and say nothing until the board has said hello or cannot be starting any more (see `STARTED_S`)."""
@@ -111,6 +126,8 @@ class BridgeChain:
         """What every servo says, by its place from 1; ServoError if one reports an alarm or is beyond its limits."""
         found = {}
         for place, (position, load, celsius, decivolts, bits) in enumerate(SERVO.iter_unpack(self._state()), 1):
+            if bits == RESTARTED:
+                raise RestartedServoError(place, "its torque is off, or its limit is not what was set")
             if bits & NO_ANSWER:
                 raise ServoError(f"servo {place} does not answer the bridge")
             if bits:
@@ -119,6 +136,9 @@ class BridgeChain:
             found[place] = Health((position - CENTRE) * RAD_PER_STEP, share, decivolts / 10, float(celsius))
         self.limits.check(found)
         return found
+
+    def check_torque(self) -> None:
+        """Nothing is left to ask: the bridge looks at all torques whenever it is asked for the state."""
 
     def stop(self, patience_s: float = 5.0) -> Stop:
         """Torque off; confirmed when every servo has read it back, and no joint moves between two looks. Never raises.
@@ -154,8 +174,10 @@ class BridgeChain:
         self._journal.note("stop", **asdict(stop))
         return stop
 
-    def _ask(self, kind: int, payload: bytes, size: int, attempts: int = ATTEMPTS, timeout_s: float = _TIMEOUT_S) -> bytes:
-        """Payload of the answer, of that size; asked again when nothing or something else comes."""
+    def _ask(
+        self, kind: int, payload: bytes, size: int | None, attempts: int = ATTEMPTS, timeout_s: float = _TIMEOUT_S
+    ) -> bytes:
+        """Payload of the answer, of that size (None: of any); asked again when nothing or something else comes."""
         problem = ""
         for attempt in range(attempts):
             self.retries += attempt > 0
@@ -165,7 +187,7 @@ class BridgeChain:
             except (OSError, TerminalError, HardwareError) as error:
                 self._lose(error)
                 raise ServoError(f"the port is gone ({error})") from error
-            if answer is not None and answer.kind == kind | ANSWER and len(answer.payload) == size:
+            if answer is not None and answer.kind == kind | ANSWER and size in {None, len(answer.payload)}:
                 return answer.payload
             problem = "no answer" if answer is None else f"the answer was {answer}"
             if answer is not None and answer.kind == REFUSED | ANSWER:

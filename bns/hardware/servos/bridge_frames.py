@@ -9,9 +9,11 @@ START = 0xA5
 HELLO, ARM, MOVE, STATE, STOP = 1, 2, 3, 4, 5
 ANSWER = 0x80
 REFUSED = 0x7F
-VERSION = 3
+VERSION = 4
 NO_ANSWER = 0x80
 """In a servo's error byte: it did not answer the bridge."""
+RESTARTED = 0xC0
+"""There: it has no alarm, and its torque is off or its limit is not what the bridge has set."""
 STARTED_S = 2.0
 """Opening its port starts an Arduino anew. Its boot loader listens for 0.83 s, and a byte keeps it there for 5 s more; then the
 sketch counts its servos and says hello unasked. One that has not by now was not started anew, and can be asked."""
@@ -24,6 +26,8 @@ GOAL = struct.Struct("<HH")
 """Goal position and moving speed of one servo, in its own units."""
 SERVO = struct.Struct("<HHBBB")
 """Position, load, temperature (°C), voltage (0.1 V) and error byte of one servo."""
+ANGLES = struct.Struct("<HH")
+"""Angle limits of one servo, in the answer to a hello."""
 STOPPED = 2
 """Bytes at the beginning of the answer to a stop: a bit for each servo that was not read back with its torque off."""
 POSITION = struct.Struct("<H")

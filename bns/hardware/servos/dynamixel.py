@@ -18,7 +18,14 @@ from bns.hardware.link.terminal_error import TerminalError
 from bns.hardware.servos.ax12_table import AX12
 from bns.hardware.servos.dynamixel_port import ClockedPort
 from bns.hardware.servos.packets import BROADCAST
-from bns.hardware.servos.servo_chain import Health, ServoAlarmError, ServoError, ServoLimits
+from bns.hardware.servos.servo_chain import (
+    Health,
+    RestartedServoError,
+    ServoAlarmError,
+    ServoError,
+    ServoLimits,
+    narrow,
+)
 from bns.hardware.servos.servo_models import name_of
 from bns.hardware.servos.servo_table import BAUD, ServoTable
 from bns.hardware.stop import Stop
@@ -35,7 +42,8 @@ _REBOOTS_S = 0.5
 
 
 class DynamixelChain:
-    """Driver of servos `ids` in the order of the joints. Opening checks that each is there, once, and of the table's model."""
+    """Driver of servos `ids` in the order of the joints. Opening checks that each is there, once, of the table's model, and that
+    its angle limits leave `reach_rad` to both sides."""
 
     def __init__(
         self,
@@ -45,12 +53,16 @@ class DynamixelChain:
         journal: HardwareLog,
         limits: ServoLimits | None = None,
         table: ServoTable = AX12,
+        reach_rad: float = 0.0,
     ) -> None:
         self.ids, self._clock, self._journal = tuple(ids), clock, journal
         self.limits, self.table = limits or ServoLimits(), table
-        self.step_rad = table.rad_per_step
+        self.step_rad, self._reach_rad = table.rad_per_step, reach_rad
         self.retries = 0
         self._limits_of: dict[int, tuple[int, int]] = {}
+        self._armed, self._turn = False, 0
+        """Whether the servos were given their torque; which of them is asked for it next, where that takes a question."""
+        self._in_one = table.without_gaps("torque_enable", self._present()[1])
         self._port, self._packets = ClockedPort(port, clock), PacketHandler(float(table.protocol))
         if not self._port.setBaudRate(BAUD):
             raise HardwareError(f"{port} cannot be set to {BAUD} baud; another adapter may be needed.")
@@ -61,6 +73,12 @@ class DynamixelChain:
         if wrong and not self._port.echoes:
             self._port.find_echo()
             wrong = self._all_that_is_wrong() if self._port.echoes else wrong
+        if len(self.ids) > 1 and len(wrong) == len(self.ids) and all(" is missing (" in text for text in wrong):
+            self.close()
+            raise HardwareError(
+                f"none of the {len(wrong)} servos answers at {self._port.port_name} ({self.table.model}, {BAUD} baud). Is their "
+                "supply on, is the adapter connected to them, are model and baud rate right? bns servos scan lists who answers."
+            )
         if wrong:
             self.close()
             raise HardwareError("; ".join(wrong) + ". Check cables, power and ids (bns servos scan lists who answers).")
@@ -87,8 +105,9 @@ class DynamixelChain:
         for name in self.table.needed:
             if (value := self.read(number, name)) != self.table.wanted[name]:
                 return f"servo {number} has {name} {value}, not {self.table.wanted[name]} (bns servos check --fix sets it)"
-        self._angle_limits(number)  # now: behind a slow adapter it would hold up the first look at a robot that moves
-        return ""
+        # The limits now: behind a slow adapter they would hold up the first look at a robot that moves.
+        why = narrow(number, self._angle_limits(number), self.table, self._reach_rad)
+        return f"{why} (bns servos check --fix sets them)" if why else ""
 
     def _comes_twice(self, number: int) -> bool:
         self.read(number, "model_number")
@@ -180,6 +199,7 @@ class DynamixelChain:
                 self.write(number, "torque_limit", self._torque(share))
                 self.write(number, "torque_enable", 1)
             self._clock.sleep(0.05)
+        self._armed = True
 
     def _torque(self, share: float = 1.0) -> int:
         """So much of what the limits allow, as the register has it."""
@@ -224,14 +244,40 @@ class DynamixelChain:
         return self._limits_of[number]
 
     def health(self) -> Mapping[int, Health]:
-        """What every servo says; ServoError if one is beyond its limits."""
+        """What every servo says; ServoError if one is beyond its limits, or has lost the torque that it was given.
+
+        Where another question is needed for the torque, one servo in turn is asked.
+        """
         found = {number: self._health(number) for number in self.ids}
         self.limits.check(found)
+        if self._armed and not self._in_one:
+            self._turn = (self._turn + 1) % len(self.ids)
+            self._ask_torque(self.ids[self._turn])
         return found
 
+    def check_torque(self) -> None:
+        """ServoError if a servo has lost the torque that it was given."""
+        for number in self.ids if self._armed else ():
+            self._ask_torque(number)
+
+    def _ask_torque(self, number: int) -> None:
+        self._keeps_torque(number, self.read(number, "torque_enable"), self.read(number, "torque_limit"))
+
+    def _keeps_torque(self, number: int, enabled: int, limit: int) -> None:
+        """A servo that restarts has its torque off, or on again with the next goal, and the highest limit that it allows."""
+        if enabled and limit == self._torque():
+            return
+        lost = "its torque is off" if not enabled else f"its torque limit is {limit}, not {self._torque()}"
+        raise RestartedServoError(number, lost)
+
     def _health(self, number: int) -> Health:
-        """One exchange for all of it: the registers stand side by side."""
-        return self.decoded(self._block(number, *self._present()))
+        """One exchange for all of it: the registers stand side by side, and of some servos those of the torque before them."""
+        first, last = self._present()
+        if not self._armed or not self._in_one:
+            return self.decoded(self._block(number, first, last))
+        block, (address, _) = self._block(number, "torque_enable", last), self.table.span("torque_enable", last)
+        self._keeps_torque(number, *(self.table.in_block(name, block, address) for name in ("torque_enable", "torque_limit")))
+        return self.decoded(block[self.table.registers[first].address - address :])
 
     def _present(self) -> tuple[str, str]:
         """First and last of the registers that say how a servo is."""
@@ -263,7 +309,8 @@ class DynamixelChain:
 
     def recover(self, number: int) -> None:
         """After an overload shutdown, when its cause is gone: the torque limit is written again, or the servo rebooted where it
-        takes that; and no alarm may be left."""
+        takes that; and no alarm may be left. Its torque is off: the chain has to be armed again."""
+        self._armed = False
         if "hardware_error" in self.table.registers:
             self._checked(number, "reboot", lambda: (b"", *self._packets.reboot(self._port, number)), True)
             self._clock.sleep(_REBOOTS_S)
@@ -277,6 +324,7 @@ class DynamixelChain:
         else confirmation.
         """
         began_s, acknowledged_s, off = self._clock.now_s(), None, dict[int, int]()
+        self._armed = False
         while True:
             round_s = self._clock.now_s()
             self._all_off()  # every round: a guard that has taken the port gives it back for an order to stop alone

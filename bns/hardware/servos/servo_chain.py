@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from bns.hardware.servos.servo_table import ServoTable
 from bns.hardware.stop import Stop
 
 
@@ -25,6 +27,15 @@ class StuckServoError(ServoError):
         self.number = number
 
 
+class RestartedServoError(ServoError):
+    """A servo that works without the torque that it was given: it restarted, most often because its supply dipped."""
+
+    def __init__(self, number: int, lost: str) -> None:
+        super().__init__(
+            f"servo {number} has restarted: {lost}. Its supply dipped: check plugs, cables and what current the supply can give"
+        )
+
+
 @dataclass(frozen=True)
 class Health:
     """What a servo says of itself; load is a share of the highest torque, with the sign of its direction."""
@@ -33,6 +44,22 @@ class Health:
     load: float
     voltage_v: float
     temperature_c: float
+
+
+def narrow(number: int, limits: tuple[int, int], table: ServoTable, reach_rad: float) -> str:
+    """What is wrong with a servo's angle limits where its joint is to reach so far to both sides, or nothing.
+
+    With both at 0, an AX-12 is in wheel mode: it takes a speed for its motor's power, and turns without end.
+    """
+    low, high = limits
+    if low == high == 0 and table.protocol == 1:
+        return f"servo {number} is in wheel mode: both its angle limits are 0, so it would turn without end"
+    reach = reach_rad / table.rad_per_step
+    if low <= table.centre - reach and high >= table.centre + reach - 1:
+        return ""
+    least, most = math.floor(table.centre - reach), math.ceil(table.centre + reach - 1)
+    needs = f"a gait needs {least} to {most}, {math.degrees(reach_rad):.0f}° to both sides"
+    return f"servo {number} has the angle limits {low} to {high}; {needs}"
 
 
 @dataclass(frozen=True)
@@ -79,7 +106,13 @@ class ServoChain(Protocol):
         """Set goals and speeds of all joints; the angles really sent, after clipping, once all confirmed them."""
 
     def health(self) -> Mapping[int, Health]:
-        """What every servo says, in the order of the joints; ServoError if one reports an alarm or is beyond its limits."""
+        """What every servo says, in the order of the joints; ServoError if one reports an alarm or is beyond its limits.
+
+        From `arm` to `stop` also if one has lost its torque, as far as that takes few questions: `check_torque` asks all.
+        """
+
+    def check_torque(self) -> None:
+        """ServoError if a servo has lost the torque that it was given."""
 
     def stop(self, patience_s: float = 5.0) -> Stop:
         """Torque off, confirmed by every servo. Never raises."""

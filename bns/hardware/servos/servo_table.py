@@ -73,7 +73,11 @@ class ServoTable:
     @property
     def gapless(self) -> bool:
         """Whether there is a register at every address from `torque_enable` to `present_position`."""
-        address, size = self.span("torque_enable", "present_position")
+        return self.without_gaps("torque_enable", "present_position")
+
+    def without_gaps(self, first: str, last: str) -> bool:
+        """Whether there is a register at every address from one to another: reading where there is none is refused."""
+        address, size = self.span(first, last)
         held = {r.address + i for r in self.registers.values() for i in range(r.size)}
         return held >= set(range(address, address + size))
 

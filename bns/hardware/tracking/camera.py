@@ -23,6 +23,7 @@ from bns.hardware.tracking.sight import Sight
 with extra("robot"):
     import cv2
 
+_STREAM_MS = 10_000
 _FIRST_FRAME_S = 10.0
 _OLDEST_S = 1.0
 """A stamp that says more is by another clock."""
@@ -46,6 +47,16 @@ class Camera(Protocol):
         """Let the camera go."""
 
 
+def _capture(source: str) -> cv2.VideoCapture:
+    """Opened, if it can be; a stream that is silent is given up sooner than after OpenCV's half a minute."""
+    if source.isdecimal():
+        return cv2.VideoCapture(int(source))
+    if "://" not in source:
+        return cv2.VideoCapture(source)
+    waits = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, _STREAM_MS, cv2.CAP_PROP_READ_TIMEOUT_MSEC, _STREAM_MS]
+    return cv2.VideoCapture(source, cv2.CAP_FFMPEG, waits)
+
+
 class StreamCamera:
     """Any camera or stream that `cv2.VideoCapture` opens: a number, a device file, an address.
 
@@ -63,7 +74,12 @@ class StreamCamera:
         insist: bool = True,
     ) -> None:
         self._clock, self._source = clock, source
-        self._capture = cv2.VideoCapture(int(source)) if source.isdecimal() else cv2.VideoCapture(source)
+        self._capture = _capture(source)
+        if not self._capture.isOpened() and "://" in source:
+            raise HardwareError(
+                f"the address {source} gives no stream: nothing answers there within {_STREAM_MS / 1000:g} s, or no video. Is "
+                "the camera on, does a browser show a picture at that address?"
+            )
         if not self._capture.isOpened():
             raise HardwareError(
                 f"the camera {source} cannot be opened. Is it plugged in, used by another program, are you in the group video? "

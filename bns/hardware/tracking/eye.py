@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from itertools import pairwise
 
 import numpy as np
@@ -24,13 +25,35 @@ def _wanders(sights: list[Sight]) -> bool:
     return len(pictures) > 1 and all(np.abs(a - b).max() > SAME_M for a, b in pairwise(pictures))
 
 
+def _measured(sight: Sight) -> Sight:
+    """The sight with numbers of our own; ValueError or TypeError unless it is a pose of three numbers, seen at a time."""
+    pose = np.asarray(sight.pose, np.float64)
+    points = {str(name): np.asarray(place, np.float64) for name, place in sight.points.items()}
+    t_s, residual_m = float(sight.t_s), float(sight.residual_m)
+    if pose.shape != (3,) or any(place.shape != (2,) for place in points.values()):
+        raise ValueError(f"it gave {sight.pose!r}, which is no pose of x_m, y_m, heading_rad")
+    if not all(np.isfinite(part).all() for part in (pose, np.array([t_s, residual_m]), *points.values())):
+        raise ValueError(f"it gave the pose {pose.tolist()} at {t_s} s, which is no place; a robot that is not seen is None")
+    return Sight(t_s, pose, residual_m, points)
+
+
 class Eye:
-    """`heading_rad` is where the robot looks first, give or take half a turn; sights are `delay_s` older than their stamps."""
+    """`heading_rad` is where the robot looks first, give or take half a turn; sights are `delay_s` older than their stamps.
+
+    `kind` is what messages call the tracker.
+    """
 
     def __init__(
-        self, tracker: Tracker, clock: Clock, journal: HardwareLog, heading_rad: float, delay_s: float = 0.0
+        self,
+        tracker: Tracker,
+        clock: Clock,
+        journal: HardwareLog,
+        heading_rad: float,
+        delay_s: float = 0.0,
+        kind: str = "",
     ) -> None:
         self._tracker, self._clock, self._journal, self._delay_s = tracker, clock, journal, delay_s
+        self._called = f"the {kind} tracker" if kind else "the tracker"
         self._heading_rad, self._newest_s = heading_rad, -1.0
         self.wanders = False
         """Whether a robot that stands is seen in another place in every picture, if only by a hundredth of a millimetre."""
@@ -40,17 +63,30 @@ class Eye:
     @property
     def picture_s(self) -> float | None:
         """When the newest picture came, seen or not; None of a tracker that does not tell."""
-        return getattr(self._tracker, "picture_s", None)
+        try:
+            return getattr(self._tracker, "picture_s", None)
+        except Exception as error:
+            raise self._failed(error) from error
+
+    def _failed(self, error: Exception) -> TrialPausedError:
+        """What is raised of whatever goes wrong in a tracker, ours or somebody else's: the robot is stopped, the trial pauses."""
+        if isinstance(error, TrialPausedError):
+            return error
+        if isinstance(error, HardwareError):
+            return TrialPausedError(f"{self._called}: {error}")
+        said = f"{type(error).__name__}: {error}"
+        return TrialPausedError(f"{self._called} failed ({said}). Repair that, and see that bns track shows the robot")
 
     def look(self) -> Sight | None:
         """A sight newer than the last, with the time at which it was filmed; None if there is none.
 
-        TrialPausedError if the tracker's device is gone.
+        TrialPausedError if the tracker's device is gone, if it fails in any other way, or if what it gives is no finite pose.
         """
         try:
-            sight = self._tracker.look()
-        except HardwareError as error:
-            raise TrialPausedError(str(error)) from error
+            found = self._tracker.look()
+            sight = None if found is None else _measured(found)
+        except Exception as error:
+            raise self._failed(error) from error
         if sight is None or (sight.t_s <= self._newest_s and self._clock.now_s() > sight.t_s + _FRESH_S):
             return None
         self._newest_s = sight.t_s
@@ -82,5 +118,6 @@ class Eye:
         return None
 
     def close(self) -> None:
-        """Give the tracker's device free."""
-        self._tracker.close()
+        """Give the tracker's device free. The robot stands by now: a tracker that fails here takes nothing away."""
+        with suppress(Exception):
+            self._tracker.close()

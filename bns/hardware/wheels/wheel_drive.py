@@ -9,6 +9,7 @@ import numpy as np
 
 from bns.hardware.agreement import Agreement
 from bns.hardware.clock import Clock
+from bns.hardware.leaps import Leaps
 from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.safety import Watch
 from bns.hardware.tracking.eye import Eye
@@ -17,6 +18,8 @@ from bns.hardware.tracking.sight import Sight
 _TICK_S, _POLL_S, _SUSPECTS_S = 0.1, 0.01, 0.03
 _SAME_S = 1e-4
 """Two times closer than this are one."""
+_FASTER = 1.5
+"""So many times the speed of its faster wheel a robot may be seen to have: poses may differ from orders by half of the way."""
 
 
 class RobotLostError(Exception):
@@ -63,6 +66,7 @@ class WheelDrive:
         self._orders: list[Order] = []
         self._ends_s: list[float] = []
         self._seen: list[tuple[float, np.ndarray]] = []
+        self.leaps, self._fastest_m_s = Leaps(), 0.0
 
     def carry_out(self, left_m_s: float, right_m_s: float, duration_s: float) -> None:
         """One command, watched until its time is over; if the robot is not seen just then, it lasts until it is."""
@@ -70,6 +74,8 @@ class WheelDrive:
         left, right = self._wheels.set_speed_m_s(left_m_s, right_m_s)
         if not self._orders:
             self._seen.append((asked_s, self._start))
+            self.leaps.seen(asked_s, self._start[:2], 0.0)
+        self._fastest_m_s = max(self._fastest_m_s, abs(left), abs(right))
         self._orders.append(Order(asked_s, left, right))
         self._agreement.ordered(asked_s, left, right)
         self._journal.note("command", left_m_s=left, right_m_s=right, duration_s=duration_s)
@@ -104,6 +110,8 @@ class WheelDrive:
             self._seen.append((sight.t_s, sight.pose))
         self._watch.check(sight, self._eye.picture_s)
         if sight is not None:
+            if self._orders:  # if it lasts, it is the agreement of poses and orders that pauses the trial
+                self.leaps.seen(sight.t_s, sight.pose[:2], _FASTER * self._fastest_m_s)
             self._agreement.seen(sight)
         return sight
 

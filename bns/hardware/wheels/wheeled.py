@@ -76,7 +76,7 @@ class WheeledPlatform:
         stopping: Stopping,
     ) -> None:
         self._driver, self._wheels, self._clock, self._journal = driver, wheels, clock, journal
-        self._eye = Eye(tracker, clock, journal, math.pi / 2, delay_of(rig.tracker))
+        self._eye = Eye(tracker, clock, journal, math.pi / 2, delay_of(rig.tracker), rig.tracker["kind"])
         self._units = np.array([wheels.units_per_m_s, wheels.units_per_m_s, wheels.units_per_s])
         self._watch, self._disagree_s = Watch(rig.limits, clock, stopping), rig.limits.disagree_s
 
@@ -141,4 +141,4 @@ class WheeledPlatform:
         assert guard.last is not None
         seconds = self._clock.now_s() - began_s
         done = (drive.carried() * self._units).astype(np.float32)
-        return Driven(done, drive.poses(), drive.rows(), guard.last, ended, seconds)
+        return Driven(done, drive.poses(), drive.rows(), guard.last, ended, seconds, leaps=drive.leaps.count)

@@ -9,6 +9,8 @@ from bns.errors import ModelError
 from bns.robots.snake.gait import COMMANDS_A_CYCLE, joint_angles
 
 PARAMETERS = ("a_lat_rad", "a_vert_rad", "omega_rad", "alpha_rad")
+GREATEST_RAD = np.pi / 2
+"""No joint of a gait bends further."""
 
 
 def cycle_angles(parameters: ArrayLike, joints: int = 12, switched: bool = False) -> np.ndarray:
@@ -25,7 +27,7 @@ def _checked(parameters: ArrayLike) -> np.ndarray:
     if given.shape != (4,) or not np.isfinite(given).all():
         raise ModelError(f"a cycle is given as {given.tolist()}; give four finite numbers: {', '.join(PARAMETERS)}.")
     a_lat, a_vert = given[:2]
-    if not (0 <= a_vert < a_lat <= np.pi / 2 + 1e-6 or a_lat == a_vert == 0):
+    if not (0 <= a_vert < a_lat <= GREATEST_RAD + 1e-6 or a_lat == a_vert == 0):
         raise ModelError(
             f"the amplitudes are a_lat_rad = {a_lat:g} and a_vert_rad = {a_vert:g}; allowed is "
             "0 <= a_vert_rad < a_lat_rad <= pi/2 (a body that lifts higher than it bends tips over): lower a_vert_rad."

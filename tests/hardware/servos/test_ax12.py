@@ -12,7 +12,7 @@ from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.servos.ax12_table import RAD_PER_STEP, REGISTERS
 from bns.hardware.servos.dynamixel import DynamixelChain
 from bns.hardware.servos.packets import BROADCAST, WIRES
-from bns.hardware.servos.servo_chain import Health, ServoError, ServoLimits, StrainWatch
+from bns.hardware.servos.servo_chain import Health, RestartedServoError, ServoError, ServoLimits, StrainWatch
 
 from .watched import speeds_under_torque
 
@@ -486,3 +486,59 @@ def test_a_speed_has_no_sign(chain):
     driver, bus, _ = chain()
     driver.move([-0.1] * 3, [-1.0] * 3)
     assert {s.get("moving_speed") for s in bus.servos} == {86}
+
+
+@pytest.mark.parametrize(
+    ("loses", "message"),
+    [
+        ({"torque_enable": 0, "torque_limit": 1023}, "servo 2 has restarted: its torque is off. Its supply dipped"),
+        ({"torque_limit": 1023}, "servo 2 has restarted: its torque limit is 1023, not 818. Its supply dipped"),
+    ],
+)
+def test_a_servo_that_restarts_is_named_at_the_next_look(chain, loses, message):
+    driver, bus, _ = chain()
+    driver.health()  # nobody has torque yet, and nobody was given any
+    driver.arm()
+    driver.health()
+    for name, value in loses.items():
+        bus.servos[1].put(name, value)
+    for asks in (driver.health, driver.check_torque):
+        with pytest.raises(RestartedServoError, match=message):
+            asks()
+    assert driver.stop().confirmed
+    driver.health()
+    driver.check_torque()
+
+
+def test_the_torque_takes_no_question_of_its_own(chain):
+    driver, bus, _ = chain()
+    driver.arm()
+    answers, asked = bus.receive, []
+    bus.receive = lambda data: (asked.append(data), answers(data))[1]
+    driver.health()
+    assert asked == [packet(number, 2, bytes([24, 20])) for number in IDS]
+
+
+def test_an_emulated_servo_restarts_as_the_manual_says(clock):
+    """What is kept: its settings. What is not: torque, its limit (which is that of the settings then), speed, goal, alarm."""
+    servo = Servo(3, clock, Faults((Fault("restart", at_s=0.0, servo=3),)), ccw_angle_limit=900, max_torque=700)
+    servo.put("torque_enable", 1)
+    servo.put("torque_limit", 500)
+    servo.put("moving_speed", 40)
+    servo.latched = 32
+    servo.update()
+    kept = ("id", "ccw_angle_limit", "torque_enable", "torque_limit", "moving_speed")
+    assert [servo.get(name) for name in kept] == [3, 900, 0, 700, 0]
+    assert servo.get("goal_position") == servo.get("present_position")
+    assert not servo.errors()
+
+
+def test_a_servo_in_wheel_mode_does_not_move(chain):
+    with pytest.raises(HardwareError, match=r"servo 2 is in wheel mode.*would turn without end .bns servos check --fix sets"):
+        chain(prepare=lambda bus: bus.servos[1].put("ccw_angle_limit", 0))
+
+
+def test_that_no_servo_answers_is_said_once(chain):
+    with pytest.raises(HardwareError, match=r"^none of the 3 servos answers at .*supply.*bns servos scan") as said:
+        chain(asked=(7, 8, 9))
+    assert "servo 8" not in str(said.value)

@@ -32,7 +32,7 @@ from bns.hardware.servos.bridge_frames import (
     encoded,
     searched,
 )
-from bns.hardware.servos.servo_chain import ServoError, ServoLimits
+from bns.hardware.servos.servo_chain import RestartedServoError, ServoError, ServoLimits
 
 
 @pytest.fixture
@@ -111,6 +111,24 @@ def test_the_watchdog_takes_the_torque_off(bridge, clock):
     assert all(s.get("torque_enable") for s in emulator.servos)
     clock.sleep(0.2 * WATCHDOG_S)
     assert not any(s.get("torque_enable") for s in emulator.servos)
+
+
+@pytest.mark.parametrize("loses", [{"torque_enable": 0}, {"torque_limit": 1023}])
+def test_a_servo_that_restarts_behind_the_bridge_is_named(bridge, loses):
+    driver, emulator = bridge()
+    driver.health()
+    driver.arm()
+    driver.health()
+    for name, value in loses.items():
+        emulator.servos[1].put(name, value)
+    with pytest.raises(RestartedServoError, match="servo 2 has restarted: its torque is off, or its limit is not what was set"):
+        driver.health()
+    emulator.servos[1].latched = 32  # an overload switches the torque off as well, and is its cause
+    with pytest.raises(ServoError, match="servo 2: overload"):
+        driver.health()
+    emulator.servos[1].latched = 0
+    assert driver.stop().confirmed
+    assert driver.health()
 
 
 def test_stop_is_read_back(bridge):
@@ -203,7 +221,7 @@ def test_alarms_are_errors(bridge, clock):
 
 
 def test_other_bridges_are_refused(bridge, monkeypatch):
-    with pytest.raises(HardwareError, match="has found 2 servos; version 3 and 3 servos are needed"):
+    with pytest.raises(HardwareError, match="has found 2 servos; version 4 and 3 servos are needed"):
         bridge(count=2)
     monkeypatch.setattr("bns.hardware.emulators.devices.bridge.VERSION", 1)
     with pytest.raises(HardwareError, match=r"speaks version 1 .*Load the sketch of this bns"):

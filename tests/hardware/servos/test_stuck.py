@@ -7,6 +7,7 @@ import pytest
 
 from bns.errors import TrialPausedError
 from bns.hardware.clock import EmulatedClock
+from bns.hardware.leaps import Leaps
 from bns.hardware.link.hardware_log import HardwareLog, events
 from bns.hardware.platform import Driven
 from bns.hardware.platforms import snake
@@ -105,6 +106,7 @@ class Drive:
 
     def __init__(self, error, straightening):
         self.error, self.straightening, self.cycles, self.rows, self.spans_s = error, straightening, [], [], []
+        self.leaps = Leaps()
 
     def __call__(self, *_):
         return self

@@ -124,6 +124,21 @@ def test_a_chain_arms_moves_and_stops(chain, clock, kind):
     assert not any(s.get("torque_enable") for s in bus.servos)
 
 
+def test_a_servo_that_restarts_is_found_in_turn_or_when_all_are_asked(chain):
+    driver, bus, _ = chain()
+    driver.health()
+    driver.check_torque()
+    driver.arm()
+    for _ in range(2 * len(IDS)):
+        driver.health()
+    driver.check_torque()
+    bus.servos[1].reboot()
+    with pytest.raises(ServoError, match="servo 2 has restarted: its torque is off"):
+        driver.check_torque()
+    with pytest.raises(ServoError, match="servo 2 has restarted: its torque is off"):
+        _ = [driver.health() for _ in IDS]
+
+
 @pytest.mark.parametrize("kind", X430)
 def test_torque_never_comes_on_with_the_speed_that_a_servo_was_left_at(chain, kind):
     driver, bus, _ = chain(kind=kind, moving_speed=500)
@@ -159,7 +174,7 @@ def test_lost_and_garbled_answers_are_asked_for_again(chain):
         ({"model_number": 1020}, "servo 1 is of the model XM430-W350, not XL430-W250"),
         ({"operating_mode": 1}, r"servo 1 has operating_mode 1, not 3 \(bns servos check --fix"),
         ({"drive_mode": 8}, "servo 1 has drive_mode 8, not 0"),  # torque would come on with any goal
-        ({"baud_rate": 1}, "servo 1 is missing"),
+        ({"baud_rate": 1}, "none of the 3 servos answers"),
     ],
 )
 def test_chains_that_cannot_be_used(chain, build, message):

@@ -48,6 +48,9 @@ class Chain:
     def health(self):
         return {n: Health(float(self._at[n - 1]), 0.1, 12.0, 30.0) for n in range(1, 13)}
 
+    def check_torque(self):
+        pass
+
 
 class Pictures:
     """A tracker at 15 pictures a second that sees both markers at rest, as far as its noise lets it, until `ends_s`."""

@@ -1,5 +1,6 @@
 """Poses are stamped when they were filmed: the tracker's delay, measured by the robot's own motion, and what a trial does."""
 
+from contextlib import contextmanager
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -161,3 +162,21 @@ def test_a_delay_may_be_up_to_a_second_either_way():
 def test_a_delay_that_makes_no_sense_is_named():
     with pytest.raises(HardwareError, match="delay_s is 'late'; it is a number of seconds, up to 1"):
         measured_delay(setup(None, 0.0, delay_s="late"))
+
+
+def test_without_anybody_to_ask_nothing_moves(monkeypatch):
+    moved = []
+    platform = SimpleNamespace(move_about=moved.append)
+
+    @contextmanager
+    def opened(*_):
+        yield SimpleNamespace(platform=platform)
+
+    def ended(_question):
+        raise EOFError
+
+    monkeypatch.setattr("bns.trial.delay.open_rig", opened)
+    monkeypatch.setattr("builtins.input", ended)
+    with pytest.raises(HardwareError, match="nobody to ask before the robot moves"):
+        measured_delay(TrialSetup(shipped_rig("khepera")))
+    assert not moved

@@ -90,3 +90,9 @@ def test_input_devices_are_listed_by_name(tmp_path):
     assert str(listed) == "ok   input device /dev/input/event0: Power Button"
     assert str(paired) == "ok   input device /dev/input/event91: Nintendo Wii Remote IR"
     assert not usable.fine
+
+
+def test_without_a_rig_it_says_that_no_robot_was_checked(monkeypatch, capsys):
+    monkeypatch.setattr("bns.cli.commands.doctor.examine", lambda *_: [])
+    assert main(["doctor"]) == 0
+    assert "no robot and no tracker was checked: give --rig FILE" in capsys.readouterr().out

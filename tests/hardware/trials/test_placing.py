@@ -7,8 +7,11 @@ import pytest
 
 from bns.errors import TrialPausedError
 from bns.hardware.link.hardware_log import HardwareLog
+from bns.hardware.platform import Driven
 from bns.hardware.rig import shipped_rig
+from bns.hardware.stop import Stop
 from bns.trial.driver import TrialDriver
+from bns.trial.operator import Decision
 
 START = np.zeros(3)
 FAR = np.array([1.0, 0.0, 0.0])
@@ -34,3 +37,15 @@ def test_a_robot_that_stands_wrong_after_the_last_request_pauses_the_trial(clock
     with pytest.raises(TrialPausedError, match="could not be brought to its start: The tracker does not see the robot"):
         own._ready(0)
     assert len(heard) == 3
+
+
+def test_why_the_last_drive_ended_is_said_to_whoever_puts_the_robot_back(clock):
+    ended = "the camera has sent no new picture for 0.27 s"
+    own, heard = driver(clock, [START, None, START])
+    own._platform.readings = dict
+    own._platform.drive = lambda _commands: Driven(np.ones((1, 3)), np.zeros((2, 3)), [], Stop(True, 0.1, 0.1), ended)
+    own._operator.arm = lambda _what: None
+    own._operator.accept = lambda *_: Decision("next")
+    for number in (1, 2):
+        own.evaluate(number, np.ones((1, 3)))
+    assert heard == [f"The tracker does not see the robot (the last drive ended because {ended})"]

@@ -126,8 +126,33 @@ def test_servos_that_fail_pause_the_trial_with_the_robot_stopped(rigged, fault, 
     assert not any(torques(on))
 
 
+@pytest.mark.parametrize("at_s", [2.5, 3.0])
+@pytest.mark.parametrize(
+    "driver", [{"wiring": "bus"}, {"wiring": "bridge"}, {"wiring": "bus", "protocol": 2, "model": "XL430-W250"}]
+)
+def test_a_servo_that_restarts_pauses_the_trial_and_its_drive_is_not_kept(rigged, driver, at_s):
+    on = rigged(Fault("restart", at_s=at_s, servo=4), **driver)
+    with pytest.raises(TrialPausedError, match="the servos failed: servo 4 has restarted: its torque"):
+        on.platform.drive(np.array([GENTLE] * 3, np.float32))
+    assert not any(torques(on))
+    assert all(servo.get("torque_limit") for servo in on.emulation.servos)
+
+
+def test_a_supply_that_dips_pauses_the_trial_and_leaves_no_row(tmp_path, capsys):
+    plan = tmp_path / "faults.yaml"
+    plan.write_text(yaml.safe_dump({"faults": [{"kind": "restart", "at_s": 3.0, "id": number} for number in range(1, 13)]}))
+    asked = [*TRIAL, "--evaluations", 1, "--results", tmp_path]
+    assert call(*asked, "--faults", plan) == 3
+    assert "servo 1 has restarted" in capsys.readouterr().err
+    [journal] = (tmp_path / "trials").glob("*/journal.jsonl")
+    assert not past_evaluations(journal)
+    assert not len(measured(journal))
+
+
 def test_a_limit_in_a_servo_that_cuts_the_gait_is_named(rigged):
-    on = rigged(prepare=lambda emulation: emulation.servos[2].put("ccw_angle_limit", 530))
+    """One that came to be after the servos were looked at."""
+    on = rigged(wiring="bridge")
+    on.emulation.servos[2].put("ccw_angle_limit", 530)
     with pytest.raises(TrialPausedError, match=r"joint 3 should go to 2\d°, but the command was clipped to 5°: widen"):
         on.platform.drive(np.array([GENTLE], np.float32))
     assert not any(torques(on))
@@ -137,6 +162,35 @@ def examined(rigged, clock, tmp_path, **driver):
     on = rigged(**driver)
     on.platform._chain.close()
     return on, lambda: [str(found) for found in examine(on.emulation.rig, clock, tmp_path)]
+
+
+@pytest.mark.parametrize("wiring", ["bus", "bridge"])
+@pytest.mark.parametrize(
+    ("low", "high", "message"),
+    [
+        (0, 0, "servo 5 is in wheel mode: both its angle limits are 0"),
+        (300, 723, "servo 5 has the angle limits 300 to 723; a gait needs 205 to 818, 90° to both sides"),
+        (206, 1023, "servo 5 has the angle limits 206 to 1023"),
+        (0, 817, "servo 5 has the angle limits 0 to 817"),
+        (205, 818, ""),
+    ],
+)
+def test_servos_that_cannot_bend_as_a_gait_needs_do_not_move(rigged, clock, tmp_path, wiring, low, high, message):
+    made = []
+
+    def prepare(emulation):
+        made.append(emulation)
+        emulation.servos[4].put("cw_angle_limit", low)
+        emulation.servos[4].put("ccw_angle_limit", high)
+
+    if message:
+        with pytest.raises(HardwareError, match=f"{message}.*bns servos check --fix"):
+            rigged(prepare=prepare, wiring=wiring)
+    else:
+        rigged(prepare=prepare, wiring=wiring).platform._chain.close()
+    assert not any(servo.get("torque_enable") for servo in made[0].servos)
+    said = [str(found) for found in examine(made[0].rig, clock, tmp_path)]
+    assert any(message in found and found.startswith("BAD") for found in said) == bool(message)
 
 
 @pytest.mark.parametrize("wiring", ["bus", "bridge"])

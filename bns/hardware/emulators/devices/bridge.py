@@ -10,6 +10,7 @@ from bns.hardware.clock import EmulatedClock
 from bns.hardware.emulators.devices.servo import Servo
 from bns.hardware.emulators.faults import Faults
 from bns.hardware.servos.bridge_frames import (
+    ANGLES,
     ANSWER,
     ARM,
     GOAL,
@@ -18,6 +19,7 @@ from bns.hardware.servos.bridge_frames import (
     NO_ANSWER,
     POSITION,
     REFUSED,
+    RESTARTED,
     SERVO,
     STATE,
     STOP,
@@ -59,6 +61,7 @@ class BridgeEmulator:
         """Whether something was said to it while it was starting."""
         self._buffer, self._heard_s, self._byte_s = b"", clock.now_s(), clock.now_s()
         self._armed = self._starting = False
+        self._torque = 0
         self._lock = threading.Lock()
         self._answers: dict[int, Callable[[bytes], bytes | None]] = {
             HELLO: lambda _p: self._hello(),
@@ -136,7 +139,8 @@ class BridgeEmulator:
         return encoded(Frame(kind | ANSWER, frame.sequence, payload or b""))
 
     def _hello(self) -> bytes:
-        return bytes([VERSION, len(self.servos)])
+        limits = (ANGLES.pack(s.get("cw_angle_limit"), s.get("ccw_angle_limit")) for s in self.servos)
+        return bytes([VERSION, len(self.servos)]) + b"".join(limits)
 
     def _nothing(self) -> bytes:
         self._clock.fell_silent()
@@ -149,7 +153,7 @@ class BridgeEmulator:
             servo.put("goal_position", servo.get("present_position"))
             servo.put("torque_limit", 1023 * payload[0] // 100)
             servo.put("torque_enable", 1)
-        self._armed = True
+        self._armed, self._torque = True, 1023 * payload[0] // 100
         return b""
 
     def _move(self, payload: bytes) -> bytes | None:
@@ -166,7 +170,9 @@ class BridgeEmulator:
         if self._faults.strikes("silent-servo", self._clock.now_s(), servo.get("id")):
             return SERVO.pack(0, 0, 0, 0, NO_ANSWER)
         names = ("present_position", "present_load", "present_temperature", "present_voltage")
-        return SERVO.pack(*(servo.get(name) for name in names), servo.errors())
+        kept = servo.get("torque_enable") and servo.get("torque_limit") == self._torque
+        bits = servo.errors() or (0 if kept or not self._armed else RESTARTED)
+        return SERVO.pack(*(servo.get(name) for name in names), bits)
 
     def _stop(self) -> bytes:
         """Torque off; bits of the servos that are silent and so may not be, and where each of the others is."""

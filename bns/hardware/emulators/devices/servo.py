@@ -113,6 +113,8 @@ class Servo:
 
     def _alarms(self, now_s: float) -> None:
         number = self.get("id")
+        if self._faults.strikes("restart", now_s, number):
+            self.reboot()
         if self._faults.strikes("overheat", now_s, number):
             self.put("present_temperature", self.get("temperature_limit") + 5)
         elif self.get("present_temperature") > _COOL_C:
@@ -140,10 +142,12 @@ class Servo:
         return found if self.kind.protocol == 1 else self.kind.alarm_bits * bool(found)
 
     def reboot(self) -> None:
-        """As if it were switched off and on: what is not kept is as after a reset."""
+        """As if it were switched off and on: what is not kept is as after a reset, the torque limit is at its highest."""
         for name, register in self.kind.registers.items():
-            if register.address >= self.kind.locked_below and not name.startswith("present"):
+            if register.address >= self.kind.registers["torque_enable"].address and not name.startswith("present"):
                 self.put(name, register.default)
+        self.put("torque_limit", self.get("max_torque"))
+        self.put("goal_position", self.get("present_position"))
         self.latched = 0
 
     def read(self, address: int, size: int) -> bytes | None:

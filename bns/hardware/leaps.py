@@ -1,0 +1,33 @@
+"""Poses that no robot can have reached: how many of a drive's there are, and since when there are only such."""
+
+from __future__ import annotations
+
+import numpy as np
+
+OFF_M = 0.04
+"""So far a tracker may be off, and a robot slide, beyond what it can drive: as much as poses may differ from orders."""
+
+
+class Leaps:
+    """Each place is compared with the last one that could be reached, so that a place that leaps and comes back counts once."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._at: tuple[float, np.ndarray] | None = None
+        self._since_s: float | None = None
+
+    def seen(self, t_s: float, place: np.ndarray, fastest_m_s: float) -> float:
+        """Take in a place (2,), m, of a robot that has been no faster than this; for how long it has been out of reach, s.
+
+        A place that leaps is in reach when the robot could have driven there meanwhile.
+        """
+        if self._at is None or t_s <= self._at[0]:
+            self._at = (t_s, place) if self._at is None else self._at
+            return 0.0
+        before_s, before = self._at
+        if float(np.hypot(*(place - before))) <= OFF_M + fastest_m_s * (t_s - before_s):
+            self._at, self._since_s = (t_s, place), None
+            return 0.0
+        self.count += 1
+        self._since_s = t_s if self._since_s is None else self._since_s
+        return t_s - self._since_s

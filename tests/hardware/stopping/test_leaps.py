@@ -1,0 +1,99 @@
+"""Poses that the robot cannot have reached are counted, told, and no cycle of a snake with one is kept as stable."""
+
+import numpy as np
+import pytest
+
+from bns.errors import TrialPausedError
+from bns.hardware.leaps import OFF_M, Leaps
+from bns.hardware.tracking.camera import FrameTracker
+from bns.hardware.tracking.sight import Sight
+from bns.hardware.tracking.wii import WiiTracker
+from bns.trial.folder import measured, past_evaluations
+
+from ..trials.calls import TRIAL, call, journal_of
+from ..trials.test_snake_trial import GENTLE, rigged  # noqa: F401
+
+
+def leapt(*places_m, fastest_m_s=0.5, step_s=0.1):
+    leaps = Leaps()
+    return [leaps.seen(step_s * i, np.array([x, 0.0]), fastest_m_s) for i, x in enumerate(places_m)], leaps.count
+
+
+def test_a_robot_may_move_as_fast_as_it_can_and_a_little_more():
+    assert leapt(0.0, 0.05 + OFF_M - 1e-6, 0.1)[1] == 0
+    assert leapt(0.0, 0.05 + OFF_M + 1e-6)[1] == 1
+
+
+def test_a_place_that_leaps_and_comes_back_counts_once():
+    assert leapt(0.0, 0.02, 0.42, 0.06, 0.08)[1] == 1
+
+
+def test_a_place_that_stays_away_counts_until_the_robot_can_be_there():
+    lasts_s, count = leapt(0.0, *[0.4] * 12)
+    assert count == 7  # 0.4 m are 0.04 and 0.72 s of driving
+    assert max(lasts_s) == pytest.approx(0.6)
+    assert lasts_s[-1] == 0.0
+
+
+def test_an_old_pose_is_no_leap():
+    leaps = Leaps()
+    leaps.seen(1.0, np.zeros(2), 0.5)
+    assert leaps.seen(1.0, np.ones(2), 0.5) == leaps.seen(0.5, np.ones(2), 0.5) == leaps.count == 0
+
+
+def leaping(tracker, monkeypatch, aside_m, which):
+    """Every sight of a robot on its way whose number is in `which` is so far aside."""
+    good, seen, moving = tracker.look, [], []
+
+    def look(self):
+        sight = good(self)
+        if sight is None:
+            return None
+        seen.append(sight.pose[:2])
+        if np.hypot(*(seen[-1] - seen[0])) > 0.03:
+            moving.append(sight.t_s)
+        if len(set(moving)) not in which:
+            return sight
+        aside = np.array([aside_m, 0.0])
+        points = {name: place + aside for name, place in sight.points.items()}
+        return Sight(sight.t_s, sight.pose + np.array([aside_m, 0.0, 0.0]), sight.residual_m, points)
+
+    monkeypatch.setattr(tracker, "look", look)
+
+
+def test_leaps_of_a_khepera_are_counted_and_told(tmp_path, monkeypatch, capsys):
+    leaping(WiiTracker, monkeypatch, 0.3, {3, 8})
+    assert call(*TRIAL, "--evaluations", 1, "--results", tmp_path) == 0
+    said = capsys.readouterr()
+    assert "evaluation 1: 2 poses are further from the one before than the robot can drive" in said.err
+    assert "2 poses are further from the one before than the robot can drive" in said.out
+    assert len(past_evaluations(journal_of(tmp_path))) == 1
+    assert len(measured(journal_of(tmp_path)))
+
+
+def test_a_trial_without_leaps_says_nothing_of_them(tmp_path, capsys):
+    assert call(*TRIAL, "--evaluations", 1, "--results", tmp_path) == 0
+    assert "than the robot can drive" not in "".join(capsys.readouterr())
+
+
+def test_a_cycle_of_a_snake_with_a_leap_is_not_stable(rigged, monkeypatch):  # noqa: F811
+    on = rigged()
+    leaping(FrameTracker, monkeypatch, 0.4, {4})
+    driven = on.platform.drive(np.array([GENTLE, GENTLE], np.float32))
+    assert driven.leaps == 1
+    assert driven.poses[:, 8].tolist() == [1.0, 0.0, 1.0]
+    assert {row["stable"] for row in driven.rows if row["cycle"] == 1 and not np.isnan(row["stable"])} == {0.0}
+
+
+def test_a_snake_that_drives_as_it_can_has_no_leap(rigged):  # noqa: F811
+    driven = rigged().platform.drive(np.array([GENTLE, GENTLE], np.float32))
+    assert driven.leaps == 0
+    assert driven.poses[:, 8].all()
+
+
+def test_a_snake_that_stays_where_it_cannot_be_pauses_the_trial(rigged, monkeypatch):  # noqa: F811
+    on = rigged()
+    leaping(FrameTracker, monkeypatch, 0.8, set(range(4, 1000)))
+    with pytest.raises(TrialPausedError, match=r"seen where it cannot have moved to for 0\.\d s.*was it carried"):
+        on.platform.drive(np.array([GENTLE] * 3, np.float32))
+    assert not any(servo.get("torque_enable") for servo in on.emulation.servos)
