@@ -27,6 +27,7 @@ from bns.hardware.servos.bridge_frames import (
     SERVO,
     STARTED_S,
     STATE,
+    STILL_SPOKEN,
     STOP,
     STOPPED,
     VERSION,
@@ -44,6 +45,8 @@ with extra("robot"):
 BAUD = 115200
 ATTEMPTS = 6
 _TIMEOUT_S = 0.15
+_HELLOS = range(2, 2 + 16 * ANGLES.size + 1, ANGLES.size)
+"""Sizes of the answer to a hello: version and number of servos, and the angle limits of up to 16 (none of them in version 3)."""
 _STOP_TIMEOUT_S = 0.06
 """Twelve servos read take 12 ms, one of them silent nine more; the frames 4 ms."""
 _BETWEEN_S = 0.02
@@ -79,16 +82,18 @@ class BridgeChain:
         self._serial: serial.Serial | None = None
         try:
             self._open()
-            version, found, *limits_of = self._ask(HELLO, b"", None)
+            version, found, *limits_of = self._ask(HELLO, b"", _HELLOS)
         except ServoError as error:
             self.close()
             raise HardwareError(f"no bridge answers at {port} ({error}). Is its sketch loaded, is it powered?") from error
-        if version != VERSION or found != count:
+        if version not in STILL_SPOKEN or found != count:
             self.close()
             raise HardwareError(
                 f"the bridge speaks version {version} and has found {found} servos; version {VERSION} and {count} servos are "
                 "needed. Load the sketch of this bns; check cables and ids."
             )
+        if version < VERSION:
+            self._journal.note("bridge-version", spoken=version, newest=VERSION, lacks="angle limits, servos that restart")
         pairs = enumerate(ANGLES.iter_unpack(bytes(limits_of)), 1)
         if wrong := [why for place, pair in pairs if (why := narrow(place, pair, AX12, reach_rad))]:
             self.close()
@@ -175,9 +180,10 @@ class BridgeChain:
         return stop
 
     def _ask(
-        self, kind: int, payload: bytes, size: int | None, attempts: int = ATTEMPTS, timeout_s: float = _TIMEOUT_S
+        self, kind: int, payload: bytes, size: int | range, attempts: int = ATTEMPTS, timeout_s: float = _TIMEOUT_S
     ) -> bytes:
-        """Payload of the answer, of that size (None: of any); asked again when nothing or something else comes."""
+        """Payload of the answer, of that size or one of these; asked again when nothing or something else comes."""
+        sizes = range(size, size + 1) if isinstance(size, int) else size
         problem = ""
         for attempt in range(attempts):
             self.retries += attempt > 0
@@ -187,7 +193,7 @@ class BridgeChain:
             except (OSError, TerminalError, HardwareError) as error:
                 self._lose(error)
                 raise ServoError(f"the port is gone ({error})") from error
-            if answer is not None and answer.kind == kind | ANSWER and size in {None, len(answer.payload)}:
+            if answer is not None and answer.kind == kind | ANSWER and len(answer.payload) in sizes:
                 return answer.payload
             problem = "no answer" if answer is None else f"the answer was {answer}"
             if answer is not None and answer.kind == REFUSED | ANSWER:

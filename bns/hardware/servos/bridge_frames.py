@@ -9,7 +9,8 @@ START = 0xA5
 HELLO, ARM, MOVE, STATE, STOP = 1, 2, 3, 4, 5
 ANSWER = 0x80
 REFUSED = 0x7F
-VERSION = 4
+VERSION, STILL_SPOKEN = 4, (3, 4)
+"""Of version 3 nothing else differs: its hello has no angle limits, and it never says `RESTARTED`."""
 NO_ANSWER = 0x80
 """In a servo's error byte: it did not answer the bridge."""
 RESTARTED = 0xC0

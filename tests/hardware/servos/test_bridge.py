@@ -228,6 +228,25 @@ def test_other_bridges_are_refused(bridge, monkeypatch):
         bridge()
 
 
+def test_a_bridge_of_version_3_is_still_driven(bridge, clock, monkeypatch):
+    """Its hello is two bytes long."""
+    monkeypatch.setattr(BridgeEmulator, "_hello", lambda emulator: bytes([3, len(emulator.servos)]))
+    driver, _emulator = bridge(ccw_angle_limit=530)
+    assert (driver.count, driver.retries) == (3, 0)
+    driver.arm()
+    driver.move([0.05] * 3, [1.0] * 3)
+    clock.sleep(0.3)
+    assert driver.health()[1].position_rad == pytest.approx(0.05, abs=0.01)
+    assert driver.stop().confirmed
+
+
+@pytest.mark.parametrize("hello", [b"", b"\x03", b"\x04\x03\x00"])
+def test_a_hello_of_another_length_is_no_hello(bridge, monkeypatch, hello):
+    monkeypatch.setattr(BridgeEmulator, "_hello", lambda emulator: hello)
+    with pytest.raises(HardwareError, match="no bridge answers at"):
+        bridge()
+
+
 def test_the_driver_keeps_silent_until_the_board_has_started(bridge, clock):
     waited_s = []
     while not waited_s or (waited_s[-1] >= STARTED_S and len(waited_s) < 5):  # emulated time does not wait for a busy kernel
