@@ -40,6 +40,7 @@ def test_every_answer_says_that_the_model_knows_the_trials(logs, model):
     assert not any(SAID in warning for warning in bns.add(new, "wheel-mismatch", model).warnings)
 
 
+@pytest.mark.slow
 def test_a_diagnosis_says_it_first(logs, model):
     assert SAID in bns.diagnose(logs[0], model).notes[0]
     assert not any(SAID in note for note in bns.diagnose(logs[1], model).notes)

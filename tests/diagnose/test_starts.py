@@ -26,7 +26,8 @@ def test_an_effect_is_fitted_though_others_do_by_now_what_it_does():
     )
     problem, base, effects = fitted(robot, imitated, trials=16, commands=6, speeds=(-0.2, 0.2))
     start = best_start(problem, base, effects["dead-zone-mismatch"])
-    assert start.loss >= base.loss > start.promised + 10
+    assert start.loss >= base.loss * (1 - 1e-12)  # rounding: the sums of two fits of the same numbers
+    assert base.loss > start.promised + 10
     added = fit_with(problem, base, effects["dead-zone-mismatch"])
     least = problem.fit(robot).loss
     assert added.loss - least < 0.1 * (base.loss - least)

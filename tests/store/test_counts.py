@@ -94,9 +94,19 @@ def alike(results, before):
     )
 
 
+TRIED_ALWAYS = {("evals", (0, False)), ("paths", (-3, True)), ("runs", (0, False))}
+"""Of the tables and rows, those that are not left to the slow tests."""
+
+
 @pytest.mark.filterwarnings("ignore:.*has lost rows")
-@pytest.mark.parametrize("table", TABLES)
-@pytest.mark.parametrize(("row", "first_compact"), [(0, False), (-3, True)])
+@pytest.mark.parametrize(
+    ("table", "row", "first_compact"),
+    [
+        pytest.param(table, *case, marks=() if (table, case) in TRIED_ALWAYS else pytest.mark.slow)
+        for table in TABLES
+        for case in ((0, False), (-3, True))
+    ],
+)
 def test_a_run_that_has_lost_a_row_is_done_again_and_once(tmp_path, table, row, first_compact):
     before = store(tmp_path, RUNS)
     lost = lose(tmp_path, table, row if table != "runs" else row % 4)
