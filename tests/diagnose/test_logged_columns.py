@@ -121,7 +121,7 @@ def test_what_an_unlisted_verdict_says_of_a_column_holds_its_name_and_its_comman
     after = problem.fit(before.model.with_active(formula_effect("loss", term, "v", ("load",)), (0.0,)))
     hint = Formula("v", term, after, problem.paired_comparison(before, after), "loss", "")
     alone = replace(found.diagnosis.selection, accepted=())  # the hint was fitted without effects
-    text = diagnosis_text(replace(found.diagnosis, selection=alone, formula=hint), command=found.command)
+    text = diagnosis_text(replace(found.diagnosis, selection=alone, formula=hint, terms=()), command=found.command)
     lines = text.split("\n")
     (typed,) = (line.partition("to try it: ")[2] for line in lines if "to try it" in line)
     assert typed == f"bns add '{data}' loss --term 'k * load * v' --on v --model khepera -o NEW.yaml"

@@ -110,10 +110,10 @@ def test_a_diagnosis_says_what_is_negligible(monkeypatch):
 
     def judged(selection):
         asked.append(selection.accepted)
-        return ("wheel-mismatch",)
+        return ("wheel-mismatch",), None, {}
 
     beside = []
-    monkeypatch.setattr(outcome, "negligible", judged)
+    monkeypatch.setattr(outcome, "negligible_and_errors", judged)
     monkeypatch.setattr(caveats, "_on_moved", lambda found: beside.append(found.beside_negligible) or [])
     found = diagnose(predictor(), NOMINAL)
     assert set(beside[0]) == set(found.effects)
