@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from bns.diagnose.estimate import profiles
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.parameters import FreeParameter
 from bns.diagnose.estimate.profiles import _STEP, with_simulated_profiles
@@ -100,6 +101,27 @@ def test_a_number_stays_where_the_loss_is_no_lower_at_the_parabolas_lowest_point
     assert found.values[0] == 0.74
     low, high = found.interval(0)
     assert low < 0.74 < high
+
+
+def test_intervals_are_about_the_values_at_the_end(monkeypatch):
+    """Two numbers, the second of which takes the first along when it moves."""
+    east, north = (FreeParameter("floor-slope", p) for p in SNAKE.catalogue()["floor-slope"].parameters)
+
+    def fit_of(values, loss):
+        zeros, losses = np.zeros((TRIALS, 3)), np.full(TRIALS, loss)
+        model = SNAKE.with_effect("floor-slope", **dict(zip(("east_rad", "north_rad"), values, strict=True)))
+        return Fit(model, (east, north), np.array(values), 1e-6 * np.eye(2), losses, losses, zeros, np.zeros((TRIALS, 3, 2)))
+
+    body = Body()
+    body.fitted_at = lambda model: fit_of([number.of(model) for number in (east, north)], -abs(north.of(model)))
+    monkeypatch.setattr(profiles, "_searched", lambda _problem, fit, j: (float(fit.values[j]) + 0.01 * j, 0.1))
+    monkeypatch.setattr(profiles, "followed", lambda _problem, _fit, j: np.array([1.0, 1.0]) if j else np.array([1.0, 0.0]))
+    found = with_simulated_profiles(body, fit_of([0.02, 0.0], 0.0))
+    assert found.values.tolist() == pytest.approx([0.03, 0.01])
+    for j, value in enumerate(found.values):
+        low, high = found.interval(j)
+        assert (low + high) / 2 == pytest.approx(value)
+        assert high > value
 
 
 def test_only_bodies_are_simulated_again():

@@ -38,28 +38,30 @@ def with_simulated_profiles(problem: Problem, fit: Fit) -> Fit:
     if problem.predictor.luck is None:
         return fit
     effects = {active.effect.name: active.effect for active in fit.model.at("mechanics")}
-    spans: dict[int, tuple[float, float]] = {}
+    halves: dict[int, float] = {}
     for j, number in enumerate(fit.free):  # each at its best, given the best values of those before
         simulated = number.effect in effects and not isinstance(effects[number.effect], PiecedEffect)
         if simulated and np.isfinite(number.parameter.plausible).all():
             found = _searched(problem, fit, j)
             if found is not None:
-                value, half = found
+                value, halves[j] = found
                 way = (value - fit.values[j]) * followed(problem, fit, j)
                 moved = moved_by(fit.model, fit.free, way)
                 problem.predictor.anchor(moved)
                 there = problem.fitted_at(moved)
                 fit = there if there.loss < fit.loss else fit
-                at = float(fit.values[j])
-                spans[j] = number.parameter.beside(at, -half), number.parameter.beside(at, half)
-    return replace(fit, spans=spans)
+    return replace(fit, spans={j: _around(fit.free[j], float(fit.values[j]), half) for j, half in halves.items()})
+
+
+def _around(number: FreeParameter, value: float, half: float) -> tuple[float, float]:
+    return number.parameter.beside(value, -half), number.parameter.beside(value, half)
 
 
 def _searched(problem: Problem, fit: Fit, j: int) -> tuple[float, float] | None:
     """The lowest point of a number's profile, and half of its 95 % interval as a share of the plausible range; None: no such."""
     number, value = fit.free[j], float(fit.values[j])
     p, way = number.parameter, followed(problem, fit, j)
-    step = max(_STEP, p.apart(p.beside(value, _STEP), value) * fit.se(j) / max(abs(p.beside(value, _STEP) - value), 1e-30))
+    step = max(_STEP, _share_of(number, value, fit.se(j)))
     losses: dict[float, Array] = {}
 
     def at(k: int) -> None:
