@@ -40,6 +40,13 @@ def test_a_last_digit_is_shown_with_its_place(found, written, capsys):
     assert re.search(rf"{EVALS}: fitness_world\[0\] was [\d.]+, is [\d.]+\n", capsys.readouterr().out)
 
 
+def test_the_thirteenth_digit_of_a_diagnosis_may_differ_and_the_eighth_may_not(found, written, capsys):
+    name, column = "world tie-far-tether", "error command"
+    assert digests.check(written, with_number(found, name, column, 1 + 2e-13)) == 0
+    assert digests.check(written, with_number(found, name, column, 1 + 2e-8)) == 1
+    assert f"{name}: {column}[0] was" in capsys.readouterr().out
+
+
 def test_another_processor_may_differ_in_last_digits_and_no_more(found, written, capsys):
     written["machine"]["processor"] = "another"
     assert digests.check(written, with_number(found, EVALS, "fitness_world", 1 + 1e-4)) == 0

@@ -32,7 +32,7 @@ def test_a_log_of_ones_own_is_read_by_menus_with_a_preview_of_every_choice(visit
     shown(page, "columns")
     unit = page.get_by_label("Position x: unit")
     unit.select_option("m")
-    page.get_by_role("alert").filter(has_text="millimetres").first.wait_for()
+    page.get_by_role("alert").filter(has_text="in different units").first.wait_for()
     unit.select_option("mm")
     page.locator("#bns-preview").filter(has_text="14 trials").wait_for()
     save(page, "Save mine.csv.import.yaml", tmp_path)
