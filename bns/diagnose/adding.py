@@ -214,7 +214,7 @@ def documented(fit: Fit, before: Model, measured: Measured, errors: PairedErrors
 
 def fitted_to(model: Model, digest: str) -> bool:
     """Whether numbers of a model came of the measurements with this digest, as `documented` says where they come from."""
-    return model.provenance.get("data_sha256") == digest or any(f"({digest})" in active.reason for active in model.effects)
+    return bool(model.provenance.get("data_sha256") == digest)
 
 
 def _with_interval(fit: Fit, active: ActiveEffect, reason: str) -> ActiveEffect:

@@ -39,7 +39,7 @@ def table_of(term, on, size):
 
 
 def found_in(table):
-    """The best family of the columns, beside the ideal drive."""
+    """The best family of the columns, added to the ideal drive."""
     predictor = WheelPredictor(tracks_of(table))
     problem = problem_for(predictor, NOMINAL)
     fit = problem.fit(NOMINAL)
