@@ -12,7 +12,7 @@ from bns.cli.main import main
 from bns.diagnose.data.variables import LABELS
 from bns.diagnose.residuals.along_variables import CHANNELS, WORLD
 from bns.examples import FOLDER
-from tests.diagnose.test_established import warming
+from tests.diagnose.residuals.test_established import warming
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 from tests.hidden_snake.worlds import Hidden, World, driven
 

@@ -3,7 +3,7 @@
 GROUPS: dict[str, tuple[str, str]] = {
     "engine": (
         "bns/engine/[!_rj]*.py bns/engine/rprop.py",
-        "tests/engine tests/robots/test_snake_breeding.py tests/diagnose/test_pose_filter.py",
+        "tests/engine tests/robots/test_snake_breeding.py tests/diagnose/predict/test_pose_filter.py",
     ),
     "tasks": (
         "bns/tasks/__init__.py bns/robots/khepera/robot.py",
@@ -16,17 +16,19 @@ GROUPS: dict[str, tuple[str, str]] = {
     ),
     "estimate": (
         "bns/diagnose/estimate/*.py",
-        "tests/diagnose/test_held_out.py tests/diagnose/test_evidence.py tests/diagnose/test_clocks.py "
-        "tests/diagnose/test_normal.py tests/diagnose/test_formula_starts.py tests/jointed/test_stretch_noise.py "
-        "tests/jointed/test_screening.py tests/jointed/test_look_around.py tests/diagnose/test_intervals.py "
-        "tests/diagnose/test_smoothing_tracker.py tests/diagnose/test_cancelling.py tests/diagnose/test_plausibility.py "
-        "tests/diagnose/test_relative_motions.py::"
-        "test_sizes_of_wheels_and_their_intervals_follow_from_mean_and_ratio",
+        "tests/diagnose/estimate/test_held_out.py tests/diagnose/estimate/test_evidence.py "
+        "tests/diagnose/estimate/test_clocks.py tests/diagnose/estimate/test_normal.py "
+        "tests/diagnose/estimate/test_formula_starts.py tests/jointed/test_stretch_noise.py "
+        "tests/jointed/test_screening.py tests/jointed/test_look_around.py tests/diagnose/estimate/test_intervals.py "
+        "tests/diagnose/estimate/test_smoothing_tracker.py tests/diagnose/estimate/test_cancelling.py "
+        "tests/diagnose/estimate/test_plausibility.py "
+        "tests/diagnose/estimate/test_relative_motions.py::test_sizes_of_wheels_and_their_intervals_follow_from_mean_and_ratio",
     ),
     "select": (
         "bns/diagnose/select/*.py",
-        "tests/diagnose/test_alike.py tests/diagnose/test_negligible.py tests/diagnose/test_equivalents.py "
-        "tests/diagnose/test_search.py tests/diagnose/test_exchanges.py tests/diagnose/test_extending.py "
+        "tests/diagnose/select/test_alike.py tests/diagnose/select/test_negligible.py "
+        "tests/diagnose/select/test_equivalents.py tests/diagnose/select/test_search.py "
+        "tests/diagnose/select/test_exchanges.py tests/diagnose/select/test_extending.py "
         "tests/jointed/test_screening.py",
     ),
     "safety": (

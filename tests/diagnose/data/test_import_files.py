@@ -20,7 +20,7 @@ from tests.diagnose.worlds import BASE_M, NOMINAL, measured
 pytest.importorskip("rosbags")
 from tests.diagnose import bags
 
-SHARED = Path(__file__).parents[3] / "shared" / "data"
+SHARED = Path(__file__).parents[4] / "shared" / "data"
 RADIUS_M = 0.021
 UNSAID = "No name says whether the speeds are commanded or measured: check it. Measured, they hide lag and limits."
 

@@ -22,7 +22,7 @@ from bns.errors import DataError
 from bns.physics.model import Model
 from bns.physics.wheels.differential_drive import observe, simulate
 
-LASER = Path(__file__).parents[3] / "shared" / "data" / "khepera3_laser"
+LASER = Path(__file__).parents[4] / "shared" / "data" / "khepera3_laser"
 RADIUS_M, WHEELBASE_M = 0.02075, 0.09
 MAPPING = {
     "relative": True,

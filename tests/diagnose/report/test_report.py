@@ -27,7 +27,7 @@ from bns.physics.effects import effect_named
 from bns.physics.formula import formula_effect
 from bns.physics.order import ORDER
 from bns.registry import EFFECTS
-from tests.diagnose.test_worst_trials import held_from
+from tests.diagnose.residuals.test_worst_trials import held_from
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)

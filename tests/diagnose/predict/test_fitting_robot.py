@@ -12,8 +12,7 @@ from bns.diagnose.predict.check_robot import _scale, check_same_robot, suggested
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.errors import DataError
 from bns.physics.wheels.differential_drive import track
-
-from .worlds import FRAME_S, NOMINAL, hidden, measured
+from tests.diagnose.worlds import FRAME_S, NOMINAL, hidden, measured
 
 
 def predictor(model):

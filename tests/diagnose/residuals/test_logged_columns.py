@@ -162,7 +162,7 @@ def test_a_formula_has_a_name_of_its_own(table, tmp_path):
 
 
 def test_the_names_are_documented():
-    page = (Path(__file__).parents[2] / "docs" / "formulas.md").read_text()
+    page = (Path(__file__).parents[3] / "docs" / "formulas.md").read_text()
     for name in (*VARIABLES, *FUNCTIONS, *ON):
         assert f"`{name}`" in page
     for name in PAST:
