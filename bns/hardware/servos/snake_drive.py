@@ -123,7 +123,7 @@ class SnakeDrive:
         self._chain.arm(self._glance)
         here = np.array([health.position_rad for health in self._chain.health().values()])
         self._go_to(np.zeros(len(here)), float(np.abs(here).max()), _STRAIGHTENING_RAD_S)
-        start = self._eye.standing(self._still_filmed)
+        start = self._eye.standing(self._still_held)
         if start is None:
             raise TrialPausedError("the camera does not see both markers: are they lit, on top, in its picture? Try: bns track")
         self._watch.begin()
@@ -210,6 +210,11 @@ class SnakeDrive:
     def _glance(self) -> None:
         """While the robot gets its torque: it stands, and the camera must go on."""
         self._eye.look()
+        self._still_filmed()
+
+    def _still_held(self) -> None:
+        """While the straight robot is looked at: servos are asked, or a bridge takes silence for a computer that is gone."""
+        self._chain.health()
         self._still_filmed()
 
     def _still_filmed(self) -> None:

@@ -21,6 +21,7 @@ from bns.hardware.platforms import snake
 from bns.hardware.rig import shipped_rig
 from bns.hardware.safety import Stopping
 from bns.hardware.servos.snake_settings import snake_settings
+from bns.hardware.tracking.eye import Eye
 from bns.physics.snake.body import Body
 from bns.physics.snake.parameters import shipped_parameters
 from bns.robots import load_robot
@@ -85,6 +86,18 @@ def test_an_emulated_drive_is_that_of_the_physics_model(rigged, wiring):
     assert driven.stop.confirmed
     assert driven.stop.acknowledged_s <= 0.2
     assert not any(torques(on))
+
+
+def test_a_slow_tracker_does_not_leave_a_bridge_without_a_frame_before_the_first_posture(rigged, clock, monkeypatch):
+    on, look = rigged(wiring="bridge"), Eye.look
+
+    def slowly(eye):
+        clock.sleep(0.06)  # ten looks at the straight robot then take longer than the bridge waits for a frame
+        return look(eye)
+
+    monkeypatch.setattr(Eye, "look", slowly)
+    driven = on.platform.drive(np.array([GENTLE], np.float32))
+    assert (driven.ended, len(driven.commands)) == ("", 1)
 
 
 def test_a_robot_that_rolls_over_is_stopped_and_its_cycle_is_unstable(rigged):
