@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from bns.engine.breeding import couple
@@ -76,11 +78,19 @@ def _words(individuals, cycles, purpose, step, k0, k1):  # type: ignore[no-untyp
     return words
 
 
+@inline
+def _same(one: Any, other: Any) -> Any:
+    """Whether two cycles are the same but for their repeats: then they do the same."""
+    return (one[0] == other[0]) & (one[1] == other[1]) & (one[2] == other[2]) & (one[3] == other[3])
+
+
 @exact
-def _breed_into(commands, order, cdf, share, rate, low, high, span, step, k0, k1, children):  # type: ignore[no-untyped-def]  # compiled
-    """As `breed_pair` for all pairs. Both children of a pair take the same draws, which are made once."""
-    children[0] = commands[order[0]]
+def _breed_into(commands, order, cdf, share, rate, low, high, span, step, k0, k1, children, origin):  # type: ignore[no-untyped-def]  # compiled
+    """As `breed_pair` for all pairs, and where each cycle comes from. The draws of a pair are made once for both children."""
     n, cycles, _ = children.shape
+    children[0] = commands[order[0]]
+    for j in range(cycles):
+        origin[0, j] = order[0] * cycles + j
     crossing, moving = _words(n // 2, cycles, _CUTS, step, k0, k1), _words(n, cycles, _MUTATION, step, k0, k1)
     for pair in range(n // 2):
         a, b = couple(order, cdf, pair, step, k0, k1)
@@ -92,6 +102,8 @@ def _breed_into(commands, order, cdf, share, rate, low, high, span, step, k0, k1
                     value = inherited(front[c], back[c], crossing[c, drawn], share)
                     command[c] = component(value, c, moving[c, at], rate, low[c], high[c], span[c])
                 command[1] = lift(command[0], command[1])
+                of_back = b * cycles + j if _same(command, back) else -1
+                origin[child, j] = a * cycles + j if _same(command, front) else of_back
             a, b = b, a
 
 
@@ -103,12 +115,12 @@ def breed(
     share: float,
     rate: float,
     generation: int,
-    children: np.ndarray,
+    children: Population,
 ) -> None:
     """One generation into children, as parents (n, cycles, 5): the best one as it is, uniform crossover with that share of the
-    first parent, mutation (table 5.3)."""
+    first parent, mutation (table 5.3). ``origin`` names cycles that are the same but for their repeats."""
     bounds = BOUNDS.low, BOUNDS.high, BOUNDS.mutation_span
-    _breed_into(parents, order, cdf, share, rate, *bounds, np.uint32(generation), *key.words, children)
+    _breed_into(parents, order, cdf, share, rate, *bounds, np.uint32(generation), *key.words, children.commands, children.origin)
 
 
 @exact
