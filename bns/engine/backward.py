@@ -1,9 +1,4 @@
-"""The way back through a network's hidden neurons: what their weights' gradients get from the errors of a block of patterns.
-
-In two forms. Four neurons at a time read each pattern once for all of them, but have to keep 28 sums: that is for processors with
-32 vector registers. Where there are 16, one neuron at a time is twice as fast, because no sum is stored in between; the sums are
-the same ones in the same order there.
-"""
+"""The way back through a network's hidden neurons: what their weights' gradients get from the errors of a block of patterns."""
 
 from __future__ import annotations
 
@@ -11,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from bns.engine.jit import MANY_REGISTERS, fast, inline
-from bns.engine.snn import GROUP, PER_NEURON
+from bns.engine.jit import fast, inline
+from bns.engine.snn import PER_NEURON
 
 _ZERO = np.float32(0)
 
@@ -73,66 +68,14 @@ def _one_of_four(X, w, neuron, hidden_out, error, gradient, a, b):  # type: igno
 
 
 @fast
-def _four(X, w, first, hidden_out, error, gradient, a, b):  # type: ignore[no-untyped-def]  # compiled
-    x0, x1, x2, x3, x4 = X[0, a:b], X[1, a:b], X[2, a:b], X[3, a:b], X[4, a:b]
-    h0, h1 = hidden_out[first, : b - a], hidden_out[first + 1, : b - a]
-    h2, h3 = hidden_out[first + 2, : b - a], hidden_out[first + 3, : b - a]
-    g0 = g1 = g2 = g3 = (_ZERO, _ZERO, _ZERO, _ZERO, _ZERO, _ZERO)
-    o0 = o1 = o2 = o3 = _ZERO
-    for p in range(error.size):
-        e, v0, v1, v2, v3, v4 = error[p], x0[p], x1[p], x2[p], x3[p], x4[p]
-        g0, o0 = _with(g0, o0, e * h0[p], h0[p], v0, v1, v2, v3, v4)
-        g1, o1 = _with(g1, o1, e * h1[p], h1[p], v0, v1, v2, v3, v4)
-        g2, o2 = _with(g2, o2, e * h2[p], h2[p], v0, v1, v2, v3, v4)
-        g3, o3 = _with(g3, o3, e * h3[p], h3[p], v0, v1, v2, v3, v4)
-    k = first * PER_NEURON
-    write(gradient, w, k, g0, o0)
-    write(gradient, w, k + PER_NEURON, g1, o1)
-    write(gradient, w, k + 2 * PER_NEURON, g2, o2)
-    write(gradient, w, k + 3 * PER_NEURON, g3, o3)
-
-
-@fast
-def _four_of_four(X, w, first, hidden_out, error, gradient, a, b):  # type: ignore[no-untyped-def]  # compiled
-    x0, x1, x2, x3 = X[0, a:b], X[1, a:b], X[2, a:b], X[3, a:b]
-    h0, h1 = hidden_out[first, : b - a], hidden_out[first + 1, : b - a]
-    h2, h3 = hidden_out[first + 2, : b - a], hidden_out[first + 3, : b - a]
-    g0 = g1 = g2 = g3 = (_ZERO, _ZERO, _ZERO, _ZERO, _ZERO, _ZERO)
-    o0 = o1 = o2 = o3 = _ZERO
-    for p in range(error.size):
-        e, v0, v1, v2, v3 = error[p], x0[p], x1[p], x2[p], x3[p]
-        g0, o0 = _with_of_four(g0, o0, e * h0[p], h0[p], v0, v1, v2, v3)
-        g1, o1 = _with_of_four(g1, o1, e * h1[p], h1[p], v0, v1, v2, v3)
-        g2, o2 = _with_of_four(g2, o2, e * h2[p], h2[p], v0, v1, v2, v3)
-        g3, o3 = _with_of_four(g3, o3, e * h3[p], h3[p], v0, v1, v2, v3)
-    k = first * PER_NEURON
-    write(gradient, w, k, g0, o0)
-    write(gradient, w, k + PER_NEURON, g1, o1)
-    write(gradient, w, k + 2 * PER_NEURON, g2, o2)
-    write(gradient, w, k + 3 * PER_NEURON, g3, o3)
-
-
-@fast
-def four_at_once(X, w, hidden_out, error, gradient, a, b, absent):  # type: ignore[no-untyped-def]  # compiled
-    """Add to gradient (W,) what patterns a..b give to all hidden neurons, four neurons at a time.
+def one_at_once(X, w, hidden_out, error, gradient, a, b, absent):  # type: ignore[no-untyped-def]  # compiled
+    """Add to gradient (W,) what patterns a..b give to all hidden neurons, one after the other.
 
     absent: the last input is 0 in all of them (`bns.engine.snn.last_input_is_absent`), and not worked on.
     """
-    for first in range(0, (w.size - 1) // PER_NEURON, GROUP):
-        if absent:
-            _four_of_four(X, w, first, hidden_out, error, gradient, a, b)
-        else:
-            _four(X, w, first, hidden_out, error, gradient, a, b)
-
-
-@fast
-def one_at_once(X, w, hidden_out, error, gradient, a, b, absent):  # type: ignore[no-untyped-def]  # compiled
-    """As `four_at_once`, one neuron after the other."""
     for neuron in range((w.size - 1) // PER_NEURON):
         if absent:
             _one_of_four(X, w, neuron, hidden_out, error, gradient, a, b)
         else:
             _one(X, w, neuron, hidden_out, error, gradient, a, b)
 
-
-backward = four_at_once if MANY_REGISTERS else one_at_once

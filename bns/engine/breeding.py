@@ -93,14 +93,14 @@ def spliced(cut_front: Any, cut_back: Any, length_back: Any, shortest: Any, capa
     return min(cut_front, kept), cut_back, length, kept
 
 
-@exact
+@inline
 def _same_before(lists, front, back):  # type: ignore[no-untyped-def]  # compiled
     """Whether the two commands that end at these places have the same speeds."""
     a, b = front - COMPONENTS, back - COMPONENTS
     return lists[a] == lists[b] and lists[a + 1] == lists[b + 1]
 
 
-@exact
+@inline
 def _cross(children, origin, child, lists, lengths, starts, numbers, front, back, cut_front, cut_back, shortest):  # type: ignore[no-untyped-def]  # compiled
     """First cut_front commands of one parent, then the other parent's from cut_back on; the length before and after the bound.
 

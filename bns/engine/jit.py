@@ -121,8 +121,8 @@ def fast(function: Callable[..., Any]) -> Any:
 
 
 def exact(function: Callable[..., Any]) -> Any:
-    """Compile with arithmetic as written."""
-    return numba.njit(nogil=True, cache=True, error_model="numpy")(function)
+    """Compile with arithmetic as written, also for a kernel compiled with `fast`: numba hands flags on to what is called."""
+    return numba.njit(nogil=True, cache=True, error_model="numpy", fastmath=False)(function)
 
 
 def inline(function: Callable[..., Any]) -> Any:

@@ -11,15 +11,18 @@ from typing import Any
 
 import numpy as np
 
-from bns.engine.backward import backward, share, write
-from bns.engine.jit import exact, fast, inline
-from bns.engine.snn import BLOCK, PER_NEURON, forward, hidden_count, last_input_is_absent, sigmoid
+from bns.engine import narrow, wide
+from bns.engine.backward import share, write
+from bns.engine.jit import MANY_REGISTERS, exact, fast, inline
+from bns.engine.snn import BLOCK, PER_NEURON, last_input_is_absent, sigmoid
 
 INITIAL_STEP, LARGEST_STEP, SMALLEST_STEP = 0.1, 50.0, 1e-6
 GROW, SHRINK = 1.2, 0.5
 _F = np.float32
 _GROW, _SHRINK, _LARGEST, _SMALLEST, _ZERO = _F(GROW), _F(SHRINK), _F(LARGEST_STEP), _F(SMALLEST_STEP), _F(0)
 _ALL_ALIKE = np.empty(0, np.float32)
+_ways: Any = wide if MANY_REGISTERS else narrow
+_prepared, _forward, _total, _backward = _ways.prepared, _ways.forward, _ways.total, _ways.backward
 
 
 @dataclass
@@ -157,20 +160,38 @@ def _errors(out, target, counts, bias, squashed, flat, error):  # type: ignore[n
     return _counted(error, counts) if counts.size > 0 else total
 
 
+@exact
+def _block(n):  # type: ignore[no-untyped-def]  # compiled
+    """Patterns worked on at once: at most `BLOCK`, so many that all blocks are as long, but for the last."""
+    return -(-n // -(-n // BLOCK))
+
+
 @fast
-def gradient_into(w, X, target, counts, n, absent, gradient, hidden_out, out, error, squashed, flat):  # type: ignore[no-untyped-def]  # compiled
-    """Gradient of half the summed squared error over patterns 0..n, into gradient (W,); absent: see `last_input_is_absent`."""
+def _gradient_into(w, X, inputs, target, counts, n, absent, gradient, hidden_out, out, error, squashed, flat):  # type: ignore[no-untyped-def]  # compiled
+    """Gradient of half the summed squared error over patterns 0..n, into gradient (W,); absent: see `last_input_is_absent`.
+
+    inputs: X as the ways forward and back take it; hidden_out (hidden, `BLOCK`), out and error (`BLOCK`,): room to work in.
+    """
     gradient[:] = _ZERO
-    block = -(-n // -(-n // BLOCK))
+    block = _block(n)
     for a in range(0, n, block):
-        b = min(a + block, n)
-        o, e = out[: b - a], error[: b - a]
-        o[:] = _ZERO
-        forward(X, w, hidden_out, o, a, b, absent)
-        gradient[w.size - 1] += _errors(o, target[a:b], counts[a:b], w[w.size - 1], squashed, flat, e)
-        backward(X, w, hidden_out, e, gradient, a, b, absent)
+        b, number = min(a + block, n), a // block
+        e = error[: b - a]
+        _forward(inputs, number, w, hidden_out, out, a, b, absent)
+        as_compiled = _errors(out[: b - a], target[a:b], counts[a:b], w[w.size - 1], squashed, flat, e)
+        gradient[w.size - 1] += _total(e, as_compiled)
+        _backward(inputs, number, w, hidden_out, error, gradient, a, b, absent)
         if flat > _ZERO:
             _lift(X, w, e, gradient, flat, a, b)
+
+
+@exact
+def gradient_into(w, X, target, counts, n, gradient, squashed, flat):  # type: ignore[no-untyped-def]  # compiled
+    """Gradient of one network into gradient (W,); the other arguments as of `train_network`."""
+    hidden_out = np.empty(((w.size - 1) // PER_NEURON, BLOCK), np.float32)
+    out, error = np.empty(BLOCK, np.float32), np.empty(BLOCK, np.float32)
+    absent, inputs = last_input_is_absent(X, n), _prepared(X, n, _block(n))
+    _gradient_into(w, X, inputs, target, counts, n, absent, gradient, hidden_out, out, error, squashed, flat)
 
 
 @inline
@@ -205,12 +226,11 @@ def _update(w, step, last_gradient, last_change, gradient, backtrack):  # type: 
 def train_network(w, step, last_gradient, last_change, X, target, counts, n, iterations, backtrack, squashed, flat):  # type: ignore[no-untyped-def]  # compiled
     """Iterate one network in place; all arrays float32, the first four (W,), X (5, >= n), target, counts (>= n,) or empty."""
     hidden_out = np.empty(((w.size - 1) // PER_NEURON, BLOCK), np.float32)
-    out = np.empty(BLOCK, np.float32)
-    error = np.empty(BLOCK, np.float32)
+    out, error = np.empty(BLOCK, np.float32), np.empty(BLOCK, np.float32)
     gradient = np.empty(w.size, np.float32)
-    absent = last_input_is_absent(X, n)
+    absent, inputs = last_input_is_absent(X, n), _prepared(X, n, _block(n))
     for _ in range(iterations):
-        gradient_into(w, X, target, counts, n, absent, gradient, hidden_out, out, error, squashed, flat)
+        _gradient_into(w, X, inputs, target, counts, n, absent, gradient, hidden_out, out, error, squashed, flat)
         _update(w, step, last_gradient, last_change, gradient, backtrack)
 
 
@@ -223,20 +243,7 @@ def gradient(
     flat_spot: float = 0.0,
 ) -> np.ndarray:
     """Gradient (W,) of one network: half the summed squared error over X (5, n) and target (n,), pattern by counts (n,)."""
-    hidden = hidden_count(weights.size)
     result = np.empty(weights.size, np.float32)
-    gradient_into(
-        weights,
-        X,
-        target,
-        _ALL_ALIKE if counts is None else counts,
-        X.shape[1],
-        last_input_is_absent(X, X.shape[1]),
-        result,
-        np.empty((hidden, BLOCK), np.float32),
-        np.empty(BLOCK, np.float32),
-        np.empty(BLOCK, np.float32),
-        sigmoid_output,
-        np.float32(flat_spot),
-    )
+    counts = _ALL_ALIKE if counts is None else counts
+    gradient_into(weights, X, target, counts, X.shape[1], result, sigmoid_output, np.float32(flat_spot))
     return result

@@ -24,6 +24,12 @@ BLOCK = 512
 PREDICTION_BLOCK = 1024
 
 _F = np.float32
+SATURATED = _F(15.4)
+"""Where the sigmoid ends to change."""
+NUMERATOR = (_F(-6.237572861e-12), _F(2.846224625e-08), _F(4.236714370e-05), _F(7.953990022e-03), _F(2.499998301e-01))
+DENOMINATOR = (_F(3.105721397e-06), _F(1.432030337e-03), _F(1.151486597e-01), _F(1.0))
+"""Coefficients of its polynomials in the square, the highest power first."""
+HALF = _F(0.5)
 
 
 def weight_count(hidden: int) -> int:
@@ -78,16 +84,16 @@ def sigmoid(x: Any) -> Any:
 
     1/2 + x P(x²)/Q(x²), degree 9 over 6, fitted for the smallest largest error (7e-8) on |x| <= 15.4, where it saturates.
     """
-    x = larger(_F(-15.4), smaller(_F(15.4), x))  # type: ignore[call-arg]  # mypy sees the typing context
+    x = larger(-SATURATED, smaller(SATURATED, x))  # type: ignore[call-arg]  # mypy sees the typing context
     s = x * x
-    p = _F(-6.237572861e-12) * s + _F(2.846224625e-08)
-    p = p * s + _F(4.236714370e-05)
-    p = p * s + _F(7.953990022e-03)
-    p = p * s + _F(2.499998301e-01)
-    q = _F(3.105721397e-06) * s + _F(1.432030337e-03)
-    q = q * s + _F(1.151486597e-01)
-    q = q * s + _F(1.0)
-    return _F(0.5) + x * p / q
+    p = NUMERATOR[0] * s + NUMERATOR[1]
+    p = p * s + NUMERATOR[2]
+    p = p * s + NUMERATOR[3]
+    p = p * s + NUMERATOR[4]
+    q = DENOMINATOR[0] * s + DENOMINATOR[1]
+    q = q * s + DENOMINATOR[2]
+    q = q * s + DENOMINATOR[3]
+    return HALF + x * p / q
 
 
 @inline

@@ -32,6 +32,12 @@ def blocks_of(components: Any) -> Any:
 
 
 @inline
+def inherited(front: Any, back: Any, word: Any, share: Any) -> Any:
+    """A component of a child: the front parent's with probability ``share``."""
+    return front if word * _UNIT < share else back
+
+
+@inline
 def cross(front, back, share, j, pair, step, k0, k1, child):  # type: ignore[no-untyped-def]  # compiled
     """The j-th command (components,) of a pair's child: each component is the front parent's with probability ``share``.
 
@@ -42,14 +48,19 @@ def cross(front, back, share, j, pair, step, k0, k1, child):  # type: ignore[no-
         draws = philox(np.uint32(j * blocks + block), np.uint32(pair), step, _CUTS, k0, k1)
         for word in range(min(BLOCK_WORDS, child.size - BLOCK_WORDS * block)):
             c = BLOCK_WORDS * block + word
-            child[c] = front[c] if draws[word] * _UNIT < share else back[c]
+            child[c] = inherited(front[c], back[c], draws[word], share)
+
+
+@inline
+def mutates(word: Any, rate: Any) -> Any:
+    """Whether a component with this word mutates."""
+    return word * _UNIT < rate
 
 
 @inline
 def moved_by(word: Any, rate: Any) -> Any:
-    """Whether a component with this word mutates, and where within its span it goes: -1 to 1.
+    """Where within its span a component that mutates goes, -1 to 1.
 
     Given that a draw fell below the rate it is uniform there: it serves twice.
     """
-    u = word * _UNIT
-    return u < rate, 2.0 * u / max(rate, 1e-300) - 1.0
+    return 2.0 * (word * _UNIT) / max(rate, 1e-300) - 1.0

@@ -5,9 +5,12 @@ import pytest
 
 from bns.engine.evolution import Population, rank, tournament_cdf
 from bns.engine.philox import Key, Purpose, uniforms
+from bns.engine.snn import initial_weights
 from bns.engine.uniform import component_draws
 from bns.robots import load_robot
+from bns.robots.base import RandomStream
 from bns.robots.snake.rules import BOUNDS, LARGEST_RATIO, MOST_REPEATS, REPEATS, TURN_RAD
+from bns.tasks import load_task
 
 ROBOT, KEY = load_robot("snake"), Key(4, 2)
 
@@ -48,6 +51,26 @@ def test_children_are_those_of_the_twin(n, rate):
         ROBOT.breed(KEY, parents, order, cdf, rate, 4, generation, children)
         np.testing.assert_array_equal(children.commands, twin(parents.commands, order, cdf, rate, generation))
         parents = children
+
+
+@pytest.mark.parametrize("rate", [0.0, 0.1, 1.0])
+def test_a_child_is_scored_as_anew_whatever_is_known_of_its_parents(rate):
+    parents, weights = ROBOT.initial_population(KEY, 51, 4, 100), initial_weights(KEY, 5, ROBOT.hidden, ROBOT.input_count)
+    task, scores = load_task("snake", "two-regions"), ROBOT.score(parents, weights, load_task("snake", "two-regions"))
+    order, cdf = rank(scores.fitness), tournament_cdf(51, 0.1)
+    for generation in range(1, 5):
+        children = Population(np.zeros_like(parents.commands), np.zeros_like(parents.lengths))
+        ROBOT.breed(KEY, parents, order, cdf, rate, 4, generation, children)
+        known = children.origin >= 0
+        before = parents.commands.reshape(-1, 5)[children.origin[known]]
+        np.testing.assert_array_equal(children.commands[known][:, :REPEATS], before[:, :REPEATS])
+        assert known[0].all()
+        assert known[1:].mean() < (0.5 if rate == 1 else 1)
+        stream = RandomStream(KEY, generation)
+        found, anew = ROBOT.score(children, weights, task, stream, scores), ROBOT.score(children, weights, task, stream)
+        np.testing.assert_array_equal(found.outputs, anew.outputs)
+        np.testing.assert_array_equal(found.fitness, anew.fitness)
+        parents, scores = children, found
 
 
 def test_what_is_near_is_a_mutation_of_everything():

@@ -178,9 +178,18 @@ class Snake:
         parents: Scores | None = None,
     ) -> Scores:
         """Mean fitness over ten noisy evaluations, all controllers under the same noise; without a stream there is none."""
-        commands = population.commands
-        outputs = predict(weights, self.inputs(commands.reshape(-1, commands.shape[2])), self.sigmoid_output)
-        return self.walk(population, self.displacements(outputs), task, stream)
+        outputs = self._outputs(population, weights, None if parents is None else parents.outputs)
+        return self.walk(population, self.displacements(outputs), task, stream)._replace(outputs=outputs)
+
+    def _outputs(self, population: Population, weights: np.ndarray, known: np.ndarray | None) -> np.ndarray:
+        """Outputs (networks, cycles) for all cycles; only those that are not known of the parents' generation are computed."""
+        cycles_in_all, source = population.commands.reshape(-1, population.commands.shape[2]), population.origin.ravel()
+        if known is None:
+            return predict(weights, self.inputs(cycles_in_all), self.sigmoid_output)
+        new = np.flatnonzero((source < 0) | (source >= known.shape[1]))
+        outputs = known.take(source, axis=1, mode="clip")
+        outputs[:, new] = predict(weights, self.inputs(cycles_in_all[new]), self.sigmoid_output)
+        return outputs
 
     def walk(
         self, population: Population, displacements: np.ndarray, task: Task, stream: RandomStream | None = None
@@ -226,7 +235,7 @@ class Snake:
         children: Population,
     ) -> int:
         """Uniform crossover and mutation; the number of cycles does not change, so none is cut."""
-        cycles.breed(key, parents.commands, order, cdf, self.parent_share, rate, generation, children.commands)
+        cycles.breed(key, parents.commands, order, cdf, self.parent_share, rate, generation, children)
         children.lengths[:] = parents.lengths
         return 0
 

@@ -11,12 +11,13 @@ import math
 
 import numpy as np
 
-from bns.engine.jit import copy_items, exact, inline
+from bns.engine.jit import MANY_REGISTERS, copy_items, exact, inline
 from bns.robots.snake.path import LEAST_STABLE, PENALTY_M
 from bns.robots.snake.rules import ended, moved_on, worth
 
-LANES = 12
-"""Evaluations side by side: three registers of four; the first is without noise, so that eleven rows of noise find room."""
+LANES = 16 if MANY_REGISTERS else 12
+"""Evaluations side by side: two registers of eight, or three of four. The first is without noise, so that ten rows of noise find
+room. Twelve in registers of eight, one of them half full, take nearly twice as long as sixteen."""
 _YX, _YY, _GX, _GY, _X, _Y, _AIM_X, _AIM_Y, _TOTAL, _WALKING, _INSIDE = (LANES * k for k in range(11))
 _NOISE = LANES * 11
 _STATE = LANES * 15

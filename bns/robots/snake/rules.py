@@ -10,7 +10,7 @@ import numpy as np
 from bns.engine.evolution import CommandBounds
 from bns.engine.jit import inline
 from bns.engine.philox import philox
-from bns.engine.uniform import BLOCK_WORDS, blocks_of, moved_by
+from bns.engine.uniform import BLOCK_WORDS, blocks_of, moved_by, mutates
 from bns.robots.snake.path import PENALTY_M, SMALLEST_SUM_M
 
 MOST_REPEATS = 4
@@ -98,23 +98,31 @@ def worth(total: Any) -> Any:
 
 
 @inline
-def mutate(command, rate, low, high, span, j, individual, step, purpose, k0, k1):  # type: ignore[no-untyped-def]  # compiled
-    """Mutate an individual's j-th command (5,) in place: a component with probability ``rate``, within its span (table 5.3).
+def component(value: Any, c: Any, word: Any, rate: Any, low: Any, high: Any, span: Any) -> Any:
+    """Component c of a command after mutation, with probability ``rate``, within its span; angles go round, else it is cut."""
+    if mutates(word, rate):
+        if c == REPEATS:
+            value = np.float32(1 + math.floor((moved_by(word, rate) + 1) / 2 * MOST_REPEATS))
+        else:
+            value += np.float32(moved_by(word, rate) * span)
+    if _ANGLES <= c < REPEATS:
+        value = value + _TURN if value < 0 else value - _TURN if value >= _TURN else value
+    return min(max(value, low), high)
 
-    Angles go round, everything else is cut at its bounds, and the body never lifts higher than it bends.
-    """
+
+@inline
+def lift(a_lat: Any, a_vert: Any) -> Any:
+    """A_vert of a body that never lifts higher than it bends."""
+    return min(a_vert, _RATIO * a_lat)
+
+
+@inline
+def mutate(command, rate, low, high, span, j, individual, step, purpose, k0, k1):  # type: ignore[no-untyped-def]  # compiled
+    """Mutate an individual's j-th command (5,) in place (table 5.3)."""
     blocks = blocks_of(command.size)
     for block in range(blocks):
         draws = philox(np.uint32(j * blocks + block), np.uint32(individual), step, purpose, k0, k1)
         for word in range(min(BLOCK_WORDS, command.size - BLOCK_WORDS * block)):
             c = BLOCK_WORDS * block + word
-            mutates, move = moved_by(draws[word], rate)
-            value = command[c]
-            if mutates and c == REPEATS:
-                value = np.float32(1 + math.floor((move + 1) / 2 * MOST_REPEATS))
-            elif mutates:
-                value += np.float32(move * span[c])
-            if _ANGLES <= c < REPEATS:
-                value = value + _TURN if value < 0 else value - _TURN if value >= _TURN else value
-            command[c] = min(max(value, low[c]), high[c])
-    command[1] = min(command[1], _RATIO * command[0])
+            command[c] = component(command[c], c, draws[word], rate, low[c], high[c], span[c])
+    command[1] = lift(command[0], command[1])
