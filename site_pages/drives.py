@@ -49,6 +49,7 @@ VALUES: dict[str, dict[str, float]] = {
     "force-limit": {"max_m_s2": 0.15, "turn_ratio": 4.0},
     "wheel-diameters": {"ratio": 0.9},
     "velocity-ramp": {"forward_m_s2": 0.1, "turn_rad_s2": 1.5},
+    "heading-delay": {"delay_s": 0.4},
     "heating": {"loss_per_m": 0.2, "cool_s": 60.0},
     "inertia-lag": {"tau_s": 0.6, "turn_ratio": 0.3},
     "lag-mismatch": {"tau_s": 0.4, "ratio": 3.0},

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -114,14 +114,13 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
             if again is not None and set(again.names) - set(found.names):
                 stands, found = _standing(shorter, predictor, given, tick), again
         found = _believable(found, stands, predictor, response)
-        lost = tuple(name for name in stands.selection.accepted if name not in found.names)
+        next_to, lost, new, errors = _beside_terms(found, stands, predictor, given, tick)
+        if new and errors is not None and not _falls_with_terms(errors):
+            again = _established(stands.selection, predictor, stands.rest, response, new)
+            if again is not None:
+                found = _believable(again, stands, predictor, response, new)
+                next_to, lost, new, errors = _beside_terms(found, stands, predictor, given, tick)
         unseen = unseen and not _does_better_than_more(found, stands.selection, lost)
-        new = tuple(name for name in found.names if name not in stands.selection.accepted)
-        chosen = stands.selection.only(tuple(name for name in found.names if name not in new)) if lost else stands.selection
-        # what only the terms brought to light is judged beside them
-        found_all = _explained(chosen, found.names) if new else chosen
-        next_to = _standing(found_all, predictor, given, tick, withdraw=not new) if lost or new else stands
-        errors = _errors_with_terms(next_to.selection, given, found) if found.terms else None
         matters = errors is None or _matters(errors)
         if unseen or (not matters and next_to.rest.any and not _unexplained_beside(found).any):
             slight = found.terms
@@ -154,6 +153,22 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
         with_terms,
         formula,
     )
+
+
+def _beside_terms(
+    found: Established, stands: Standing, predictor: Predictor, given: Model, tick: Callable[[str], None]
+) -> tuple[Standing, tuple[str, ...], tuple[str, ...], PairedErrors | None]:
+    """The effects that stand beside terms, those that they left nothing to do, those that they brought to light, and the errors.
+
+    What only the terms brought to light is judged with them (`_falls_with_terms`): without them it may lower no error.
+    """
+    selection = stands.selection
+    lost = tuple(name for name in selection.accepted if name not in found.names)
+    new = tuple(name for name in found.names if name not in selection.accepted)
+    chosen = selection.only(tuple(name for name in found.names if name not in new)) if lost else selection
+    found_all = _explained(chosen, found.names) if new else chosen
+    next_to = _standing(found_all, predictor, given, tick, withdraw=not new) if lost or new else stands
+    return next_to, lost, new, _errors_with_terms(next_to.selection, given, found) if found.terms else None
 
 
 def refitted(selection: SelectionResult, predictor: Predictor, given: Model) -> SelectionResult:
@@ -279,12 +294,16 @@ def _with_parts(selection: SelectionResult, names: tuple[str, ...]) -> Selection
 
 
 def _established(
-    selection: SelectionResult, predictor: Predictor, rest: Unexplained, response: bool | None = None
+    selection: SelectionResult,
+    predictor: Predictor,
+    rest: Unexplained,
+    response: bool | None = None,
+    barred: Collection[str] = (),
 ) -> Established | None:
     """The search with flexible terms, where anything is left; None where nothing is, or trials have clocks of their own.
 
     ``response`` as in `established`: where effects were withdrawn, those that stayed are no reason to leave it out. Single
-    relative motions are calibrated with all numbers free instead (`calibrated`).
+    relative motions are calibrated with all numbers free instead (`calibrated`). ``barred``: not to be brought to light.
     """
     wheeled = isinstance(predictor, WheelPredictor)
     if not wheeled or selection.fit.model.per_trial_effect is not None or predictor.tracks.relative:
@@ -295,7 +314,7 @@ def _established(
     accepted = {name: known[name] for name in selection.accepted}
     past = rest.command_times is None  # a response in time would describe the mean of delays that differ
     tried = [c.name for step in selection.steps[:1] for c in step.ranking if c.name not in accepted]
-    others = {name: known[name] for name in tried if name in known}
+    others = {name: known[name] for name in tried if name in known and name not in barred}
     found = established(predictor, selection.nominal.model, accepted, response, selection.fit.model, past, others)
     lost = set(selection.accepted) - set(found.names)
     believed = not found.terms or not any(implausible(selection.fit, name) for name in lost)
@@ -343,13 +362,15 @@ def _does_better_than_more(found: Established, selection: SelectionResult, lost:
     return certainly_lower((selection.problem, selection.fit), (found.problem, found.fit), throughout=True)
 
 
-def _believable(found: Established, stands: Standing, predictor: Predictor, response: bool | None) -> Established:
+def _believable(
+    found: Established, stands: Standing, predictor: Predictor, response: bool | None, barred: Collection[str] = ()
+) -> Established:
     """Without what lowers no error; searched again without effects that are `_absurd`: their terms serve only beside them."""
     selection = stands.selection
     found = _without_negligible(found, selection, predictor)
     while absurd := _absurd(found):
         selection = selection.lacking(absurd)
-        again = _established(selection, predictor, stands.rest, response)
+        again = _established(selection, predictor, stands.rest, response, barred)
         if again is None:
             break
         found = _without_negligible(again, selection, predictor)
@@ -366,6 +387,12 @@ def _matters(errors: PairedErrors) -> bool:
     """Do the terms certainly lower the error at one horizon, by as much as is asked of an effect (`least_fall`)?"""
     before = next((at.models[-2].name for at in errors.horizons.values()), "")
     return fall_matters(errors, before, WITH_TERMS)
+
+
+def _falls_with_terms(errors: PairedErrors) -> bool:
+    """Does the held-out error fall from the model as given to the one with the effects and the terms?"""
+    names = next(([one.name for one in at.models] for at in errors.horizons.values()), [])
+    return bool(names) and errors.between(names[0], WITH_TERMS)
 
 
 def _within_noise(errors: PairedErrors) -> bool:

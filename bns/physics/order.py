@@ -70,6 +70,7 @@ ORDER = (
     "tether-pull",
     "clock-offset",
     "clock-drift",
+    "heading-delay",
     "marker-offset",
     "sensor-rotation",
     "tilted-camera",

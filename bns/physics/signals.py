@@ -178,6 +178,8 @@ class Stamps:
     """Stage ``clock``: when the poses were really taken, any shape; begins as the times they are stamped with."""
 
     t_s: Array
+    heading_late_s: float = 0.0
+    """How long before that their headings were."""
 
 
 @dataclass(frozen=True)

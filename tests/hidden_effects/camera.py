@@ -77,7 +77,7 @@ def _trial(
 ) -> pd.DataFrame:
     edges = driving.edges_s[trial, : driving.counts[trial] + 1]
     t, extra = stamps(edges, layout)
-    poses = paths.at(trial, t - sum(cause.late_s for cause in causes))
+    poses = paths.stamped(trial, t, causes)
     for cause in causes:
         poses = cause.seen(poses)
     poses = _noisy(rng, poses, camera)

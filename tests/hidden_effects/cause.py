@@ -41,6 +41,7 @@ class Cause:
 
     delay_s = 0.0
     late_s = 0.0
+    heading_late_s = 0.0
     wheelbase = 1.0
     depends_on_pose = False
 

@@ -93,8 +93,7 @@ class Evidence:
         jitter = self.still if jitter is None else jitter
         tail = self.world.layout.tail_s
         paths = move(self.driving, self.world.nominal.wheelbase_m, causes, jitter, rng, tail, step)
-        late = sum(each.late_s for each in causes)
-        out = [paths.at(trial, times - late) for trial, times in enumerate(self.times)]
+        out = [paths.stamped(trial, times, causes) for trial, times in enumerate(self.times)]
         for each in causes:
             out = [each.seen(poses) for poses in out]
         return out

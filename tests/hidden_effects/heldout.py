@@ -86,8 +86,7 @@ def _seen(paths: Paths, driving: Driving, causes: Sequence[Cause]) -> list[np.nd
 
 def _tracked(paths: Paths, stamps_s: np.ndarray, causes: Sequence[Cause]) -> np.ndarray:
     """Tracked poses (n, 3), one a trial, as stamped."""
-    times = stamps_s - sum(cause.late_s for cause in causes)
-    poses = np.concatenate([paths.at(trial, times[trial : trial + 1]) for trial in range(len(times))])
+    poses = np.concatenate([paths.stamped(trial, stamps_s[trial : trial + 1], causes) for trial in range(len(stamps_s))])
     for each in causes:
         poses = each.seen(poses)
     return poses

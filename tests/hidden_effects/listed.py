@@ -295,6 +295,16 @@ class ClockOffset(Cause):
 
 
 @dataclass
+class HeadingDelay(Cause):
+    """Headings of poses are from delay_s before their positions."""
+
+    delay_s: float
+
+    def __post_init__(self) -> None:
+        self.heading_late_s, self.delay_s = self.delay_s, 0.0  # delay_s of a cause is that of commands
+
+
+@dataclass
 class MarkerOffset(Cause):
     """The marker is not above the axle's centre."""
 
@@ -409,6 +419,7 @@ LISTED: dict[str, type[Cause]] = {
     "camera-rotation": CameraRotation,
     "compass-deviation": CompassDeviation,
     "clock-offset": ClockOffset,
+    "heading-delay": HeadingDelay,
 }
 """In the order in which they act when two of them act on the same thing."""
 

@@ -29,6 +29,14 @@ class Paths:
         """Poses (len(t_s), 3) of one trial; the steps are fine enough for straight lines between them."""
         return np.stack([np.interp(t_s, self.t_s, self.poses[trial, :, i]) for i in range(3)], axis=-1)
 
+    def stamped(self, trial: int, t_s: np.ndarray, causes: Sequence[Cause]) -> np.ndarray:
+        """Poses (len(t_s), 3) of one trial that bear these stamps, whatever makes positions or headings late."""
+        taken_s = t_s - sum(cause.late_s for cause in causes)
+        poses = self.at(trial, taken_s)
+        if late_s := sum(cause.heading_late_s for cause in causes):
+            poses[..., 2] = self.at(trial, taken_s - late_s)[..., 2]
+        return poses
+
 
 def move(
     driving: Driving,

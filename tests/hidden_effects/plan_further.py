@@ -60,6 +60,7 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
     "supply-sag": ({"loss_s_m": 0.2}, {"loss_s_m": 0.6}),
     "tilted-camera": ({"x_per_m": 0.03, "y_per_m": -0.02}, {"x_per_m": -0.07, "y_per_m": 0.06}),
     "compass-deviation": ({"cosine_share": 0.05, "sine_share": -0.03}, {"cosine_share": -0.12, "sine_share": 0.15}),
+    "heading-delay": ({"delay_s": 0.06}, {"delay_s": -0.12}),
     "affine-distortion": ({"stretch": 0.015, "shear": 0.0}, {"stretch": -0.02, "shear": 0.03}),
     "lens-distortion": (
         {"per_m2": -0.04, "x_m": 0.8, "y_m": 0.5},

@@ -26,6 +26,7 @@ FRAMES = Layout()
 SIGNS = {
     "frame": "x east, y north, heading counter-clockwise from x",
     "clock-offset": "poses are stamped this much late: one stamped t was taken at t - offset_s",
+    "heading-delay": "a pose's heading is from delay_s before its position",
     "side-slip": "velocity slip_s * v * omega to the right of the heading: outwards in a left turn",
     "battery-sag": "speeds times 1 - rate_per_s * session_s, or times 1 + per_volt * (battery_v - first battery_v)",
     "camera-rotation": "positions turned counter-clockwise about the origin, headings as they are",

@@ -151,7 +151,7 @@ def agrees_with_the_judge(name, values):
     driving = Driving(np.stack([LEFT, RIGHT], axis=-1), edges, np.array([5]), start, np.zeros(1))
     hidden = [cause(name, values)]
     paths = move(driving, B, hidden, np.zeros((1, 5, 2)), NoLot(), step_s=4e-3)
-    theirs = hidden[0].seen(paths.at(0, edges[0, 1:]))
+    theirs = hidden[0].seen(paths.stamped(0, edges[0, 1:], hidden))
     np.testing.assert_allclose(ours[:, :2], theirs[:, :2], atol=1e-3)
     np.testing.assert_allclose(ours[:, 2], theirs[:, 2], atol=5e-3)
     plain = simulate(IDEAL, LEFT, RIGHT, LASTS, start=start)[0]

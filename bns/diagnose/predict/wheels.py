@@ -21,7 +21,7 @@ from bns.engine.pose_filter import displacements, followed
 from bns.physics.effect import Effect
 from bns.physics.model import ActiveEffect, Model
 from bns.physics.signals import Body, Conditions, Logged, View, Wheels
-from bns.physics.wheels.differential_drive import taken_at
+from bns.physics.wheels.differential_drive import stamps_of
 from bns.physics.wheels.grid import Grid
 from bns.physics.wheels.motion import flow_of, wheel_motion, with_body_effects
 from bns.physics.wheels.scans import low_passed
@@ -141,15 +141,12 @@ class WheelPredictor:
         """`followed` at the frames; read-only, for many models share it."""
         model, grid, tracks = _model_of(wheelbase_m, chain), self.grid, self.tracks
         body = self._body(wheelbase_m, _chain(model, _MOVING))
-        poses, sums = followed(
-            grid.step_s,
-            body.forward_m_s,
-            body.sideways_m_s,
-            body.yaw_rad_s,
-            body.moving,
-            tracks.trial,
-            taken_at(model, tracks.t_s, tracks.trial),
-        )
+        velocities = body.forward_m_s, body.sideways_m_s, body.yaw_rad_s, body.moving
+        stamps = stamps_of(model, tracks.t_s, tracks.trial)
+        poses, sums = followed(grid.step_s, *velocities, tracks.trial, stamps.t_s)
+        if stamps.heading_late_s:
+            before_s = stamps.t_s - stamps.heading_late_s
+            poses[:, 2] = followed(grid.step_s, *velocities, tracks.trial, before_s)[0][:, 2]
         poses.flags.writeable = sums.flags.writeable = False
         return poses, sums
 

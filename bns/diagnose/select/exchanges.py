@@ -8,10 +8,10 @@ from functools import partial
 
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.estimate.problem import problem_for
-from bns.diagnose.estimate.starts import best_start, on_either_side
+from bns.diagnose.estimate.starts import best_start, fit_extended, on_either_side
 from bns.diagnose.parallel import each
 from bns.diagnose.predict.base import Predictor
-from bns.diagnose.select.extending import simple
+from bns.diagnose.select.extending import lone_of, simple
 from bns.diagnose.select.result import SelectionStep
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect
@@ -57,10 +57,11 @@ class Exchanges:
         self.entry: Entry | None = None
         """The round in which the last effect came in: what could stand in its place was tried then."""
         self._known: tuple[Problem, tuple[str, ...], list[tuple[str, str, Fit]]] | None = None
+        self._longer: tuple[Problem, tuple[str, ...], list[tuple[str, str, Fit]], Fit] | None = None
 
     def forget(self) -> None:
         """Begin another search, with another model or other effects; what the last round tried still serves."""
-        self._known = None
+        self._known = self._longer = None
 
     def of(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> list[tuple[str, str, Fit]]:
         """Every accepted effect exchanged for every other one that might do the same."""
@@ -81,6 +82,38 @@ class Exchanges:
             result += [(name, e.name, tried) for e, tried in zip(others, fits, strict=True) if tried is not None]
         self._known = (problem, accepted, result)
         return result
+
+    def longer(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> list[tuple[str, str, Fit]]:
+        """The accepted effect exchanged for each that extends one which could nearly stand in its place; from that one's fit.
+
+        Only for those with no more numbers: more have to be earned in a step forwards. Friction that acts more on one wheel is no
+        small step from friction that slides under the robot; from friction of both wheels it is.
+        """
+        if self._longer is not None and self._longer[0] is problem and self._longer[1] == accepted:
+            return self._longer[2]
+        numbers = {a.effect.name: len(a.effect.parameters) for a in fit.model.effects}
+        lone = [e for e in lone_of(self._worth.values(), fit, accepted) if len(e.parameters) <= max(numbers[n] for n in accepted)]
+        near = self.of(problem, fit, accepted) if lone else []
+        steps = [
+            (name, effect, tried)
+            for effect in lone
+            for name, other, tried in near
+            if other == effect.extends and len(effect.parameters) <= numbers[name]
+        ]
+
+        def extended(step: tuple[str, Effect, Fit]) -> Fit:
+            self._tick(step[1].name)
+            return fit_extended(problem, step[2], step[1])
+
+        found = [(step[0], step[1].name, fitted) for step, fitted in zip(steps, each(extended, steps), strict=True)]
+        self._longer = (problem, accepted, found, fit)
+        return found
+
+    def fitted(self, problem: Problem, fit: Fit, gone: str, name: str) -> Fit | None:
+        """The fit with that effect in the place of ``gone``, if it was worked out by `longer` for this problem and this model."""
+        if self._longer is None or self._longer[0] is not problem or self._longer[3] is not fit:
+            return None
+        return next((tried for one, other, tried in self._longer[2] if (one, other) == (gone, name)), None)
 
     def _in_place(
         self,

@@ -48,25 +48,39 @@ def to_extend(
     It extends an effect of the model, given or accepted, or one that could stand for an accepted effect nearly as well, among
     ``exchanges``; or an accepted effect extends the same one in another way.
     """
-    found: dict[str, tuple[str, Fit]] = {}
-    there = {active.effect.name for active in fit.model.effects}
-    longer = [effect for effect in effects if effect.extends and effect.name not in accepted]
-    extending = {effect.extends: effect.name for effect in effects if effect.extends and effect.name in accepted}
-    inside = {e.name: next((n for n in (*e.contains, e.extends) if n in there), "") for e in longer}
-    lone = any(not inside[effect.name] and effect.extends not in extending for effect in longer)
+    lone = {effect.name for effect in lone_of(effects, fit, accepted)}
     others = list(exchanges()) if lone else []
-    for effect in longer:
-        if inside[effect.name]:
-            found[effect.name] = inside[effect.name], fit
-            continue
-        if effect.extends in extending:
-            found[effect.name] = extending[effect.extends], fit
-            continue
-        near = [(tried.loss, name, tried) for name, other, tried in others if other == effect.extends]
+    found: dict[str, tuple[str, Fit]] = {}
+    for effect in (effect for effect in effects if effect.extends and effect.name not in accepted):
+        if effect.name in lone:
+            found |= beside([effect], others)
+        else:
+            found[effect.name] = _replaced(effect, effects, fit, accepted), fit
+    return found
+
+
+def lone_of(effects: Iterable[Effect], fit: Fit, accepted: Collection[str]) -> list[Effect]:
+    """Effects that extend one which is not in the model, and which nothing accepted extends in another way."""
+    effects = list(effects)
+    return [e for e in effects if e.extends and e.name not in accepted and not _replaced(e, effects, fit, accepted)]
+
+
+def beside(lone: Iterable[Effect], exchanges: Collection[Exchange]) -> dict[str, tuple[str, Fit]]:
+    """Name of an effect that extends another -> the accepted effect in whose place that other fits best, and that fit."""
+    found: dict[str, tuple[str, Fit]] = {}
+    for effect in lone:
+        near = [(tried.loss, name, tried) for name, other, tried in exchanges if other == effect.extends]
         if near:
             _, name, tried = min(near, key=lambda n: n[0])
             found[effect.name] = name, tried
     return found
+
+
+def _replaced(effect: Effect, effects: Iterable[Effect], fit: Fit, accepted: Collection[str]) -> str:
+    """What an effect that extends another would replace in the model: a part of it, or what extends that part, too; else ""."""
+    there = {active.effect.name for active in fit.model.effects}
+    part = next((name for name in (*effect.contains, effect.extends) if name in there), "")
+    return part or next((e.name for e in effects if e.extends == effect.extends and e.name in accepted), "")
 
 
 def shorter(catalogue: Mapping[str, Effect], problem: Problem, fit: Fit, name: str) -> tuple[str, Fit] | None:

@@ -6,9 +6,10 @@ or beyond what is plausible is rejected with its reason.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
+from itertools import combinations
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.clocks.trial_clock_test import (
@@ -42,6 +43,7 @@ MIN_GAIN = DEFAULTS.select.min_gain
 BEHIND = DEFAULTS.select.behind
 CLOCKS_CHANCE = DEFAULTS.select.clocks_chance
 MOST = DEFAULTS.select.most_effects
+SIMPLE_FIRST = DEFAULTS.select.simple_first
 CURVE_FROM = DEFAULTS.select.curve_from
 
 
@@ -152,17 +154,20 @@ class StepwiseSelection:
         accepted: tuple[str, ...] = ()
         steps: list[SelectionStep] = []
         tried: set[frozenset[str]] = set()
-        while len(accepted) < MOST:
-            before = problem, fit
-            step, problem, fit = self._next_step(problem, fit, accepted)
-            steps = [*(earlier.slim() for earlier in steps), step]  # sixty fits, each as large as the log
-            if not step.selected:
-                break
-            self._exchanges.entry = Entry(*before, accepted, step)
-            accepted = (*(a for a in accepted if a != step.instead_of), step.selected)
-            problem, fit, accepted = self._exchange_step(problem, fit, accepted)
-            problem, fit, accepted = self._backward_step(problem, fit, accepted)
-            if frozenset(accepted) in tried:
+        while True:
+            there = accepted
+            if len(accepted) < MOST:
+                before = problem, fit
+                step, problem, fit = self._next_step(problem, fit, accepted)
+                steps = [*(earlier.slim() for earlier in steps), step]  # sixty fits, each as large as the log
+                if step.selected:
+                    self._exchanges.entry = Entry(*before, accepted, step)
+                    accepted = (*(a for a in accepted if a != step.instead_of), step.selected)
+                    problem, fit, accepted = self._exchange_step(problem, fit, accepted)
+                    problem, fit, accepted = self._backward_step(problem, fit, accepted)
+            if accepted == there:
+                problem, fit, accepted = self._merge_step(problem, fit, accepted)
+            if accepted == there or frozenset(accepted) in tried:
                 break
             tried.add(frozenset(accepted))
         return self._ended(problem, fit, accepted, steps)
@@ -283,21 +288,29 @@ class StepwiseSelection:
         place: Mapping[str, tuple[str, Fit]],
         of: int,
     ) -> tuple[SelectionStep, Problem, Fit]:
-        """The best candidate that earns its place; one that takes another's (``place``) must lower the error, too."""
+        """The best candidate that earns its place; one that takes another's (``place``) must lower the error, too.
+
+        So must all that gain less than such a one that lowers none: they would only do a part of what it does.
+        """
         if self.predictor.screening is not None:
             tried = self._worked_out(problem, fit, tried)
         ranking = sorted(tried, key=lambda c: -c.paired_comparison.elpd_diff)
         passed_over: list[Candidate] = []
+        none_lower = False
         for index, candidate in enumerate(ranking):
             moved = candidate.name in place and variant(self.catalogue, candidate.name)
             if not (fits_better(fit, candidate.fit) if moved else self._earned(candidate, fit, decoy_threshold)):
+                continue
+            if self._waits(candidate, place, ranking, fit, decoy_threshold):
                 continue
             if candidate.rejected_because:
                 passed_over += [candidate] if implausible(candidate.fit, candidate.name, bounds=False) else []
                 continue
             settled = self._refit_with_noise(candidate.fit.model, problem.pose_filter.noise)
             gone = place.get(candidate.name, ("",))[0]
-            if gone and not moved and not (certainly_better((problem, fit), settled) and self._needed(*settled, candidate.name)):
+            lower = moved or not (gone or none_lower) or certainly_better((problem, fit), settled)
+            if not lower or (gone and not moved and not self._needed(*settled, candidate.name)):
+                none_lower |= not lower
                 continue
             rejected_because = self._rejected(settled[1], candidate.name, bounds=False)
             if not rejected_because:
@@ -307,6 +320,26 @@ class StepwiseSelection:
             passed_over.append(ranking[index])
         best = passed_over[0].name if passed_over else ""
         return SelectionStep(tuple(ranking), decoy_threshold, "", best, of), problem, fit
+
+    def _waits(
+        self,
+        candidate: Candidate,
+        place: Mapping[str, tuple[str, Fit]],
+        ranking: Sequence[Candidate],
+        before: Fit,
+        decoy_threshold: float,
+    ) -> bool:
+        """Whether what takes another's place gives way to a simpler one, which it extends, beside that other.
+
+        Friction in the gears is a lag and a friction. Where a friction was accepted, the lag alone comes first if it gains nearly
+        as much: the friction beside it may still prove to be of one wheel, or of a cold robot.
+        """
+        gone, parts = place.get(candidate.name, ("",))[0], extended(self.catalogue, candidate.name)
+        if not gone or gone in {*parts, *self.catalogue[candidate.name].contains}:
+            return False
+        least = SIMPLE_FIRST * candidate.paired_comparison.elpd_diff
+        simpler = (c for c in ranking if c.name in parts and c.name not in place and not c.rejected_because)
+        return any(c.paired_comparison.elpd_diff >= least and self._earned(c, before, decoy_threshold) for c in simpler)
 
     def _worth_a_fit(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> list[Effect]:
         """What is fitted beside the accepted effects: where fits are costly, all that the screening ever found promising."""
@@ -343,7 +376,10 @@ class StepwiseSelection:
     def _tried(self, problem: Problem, fit: Fit, place: Mapping[str, tuple[str, Fit]], effect: Effect) -> Candidate:
         self.tick(effect.name)
         extends = place.get(effect.name)
-        if extends:
+        known = self._exchanges.fitted(problem, fit, extends[0], effect.name) if extends else None
+        if known is not None:
+            added = known
+        elif extends:
             given = any(active.effect.name == extends[0] for active in self.model.effects)
             added = fit_extended(problem, extends[1], effect, given)
         else:
@@ -364,11 +400,12 @@ class StepwiseSelection:
     ) -> tuple[Problem, Fit, tuple[str, ...]]:
         """Exchange an accepted effect for one that has earned its place too, while that makes the held-out loss smaller."""
         barred: set[str] = set()
-        for _ in range(len(accepted) if len(accepted) > 1 else 0):
+        for _ in range(len(accepted)):
             best, new, comes = fit, accepted, ""
-            for name, other, tried in self._exchanges.of(problem, fit, accepted):
+            same = self._exchanges.of(problem, fit, accepted) if len(accepted) > 1 else []
+            for name, other, tried in [*same, *self._exchanges.longer(problem, fit, accepted)]:
                 better = other not in barred and tried.held_out.sum() < best.held_out.sum() - 0.5
-                if better and self._may_stay(problem, tried, other):
+                if better and self._may_stay(problem, tried, other) and self._better_than_part(problem, tried, other):
                     best, new, comes = tried, tuple(other if a == name else a for a in accepted), other
             if new == accepted:
                 break
@@ -378,6 +415,40 @@ class StepwiseSelection:
             else:
                 problem, fit, accepted = exchanged, settled, new
         return problem, fit, accepted
+
+    def _merge_step(
+        self, problem: Problem, fit: Fit, accepted: tuple[str, ...]
+    ) -> tuple[Problem, Fit, tuple[str, ...]]:
+        """One effect in the place of two that both look like it, if it predicts trials held out better.
+
+        A short lag is, to one half, a late clock, and to the other a limit of the acceleration. A search that took the one has a
+        use for the other next, and no exchange of one effect leads from there to the lag. Not asked of bodies, whose fits take
+        minutes.
+        """
+        best, new = fit, accepted
+        for pair in combinations(accepted, 2) if self.predictor.screening is None else ():
+            alike = set.intersection(*(set(self.catalogue[name].lookalikes) for name in pair))
+            for name in sorted(alike.intersection(self.catalogue) - set(accepted)):
+                for one, tried in self._merged(problem, fit, pair, name):
+                    if tried.held_out.sum() < best.held_out.sum() - 0.5 and self._may_stay(problem, tried, one):
+                        best, new = tried, (*(a for a in accepted if a not in pair), one)
+        if new == accepted:
+            return problem, fit, accepted
+        self.tick(new[-1])
+        merged, settled = self._refit_with_noise(best.model, problem.pose_filter.noise)
+        if any(self._rejected(settled, name, bounds=False) for name in new):
+            return problem, fit, accepted
+        return merged, settled, new
+
+    def _merged(self, problem: Problem, fit: Fit, pair: tuple[str, str], name: str) -> Iterator[tuple[str, Fit]]:
+        """An effect in the place of two, then each that extends it; none with more numbers than these have together."""
+        most = sum(len(self.catalogue[one].parameters) for one in pair)
+        base = problem.fit(fit.model.without(pair[0]).without(pair[1]))
+        simple_fit = fit_with(problem, base, self.catalogue[name])
+        yield name, simple_fit
+        for effect in self._worth.values():
+            if effect.extends == name and len(effect.parameters) <= most:
+                yield effect.name, fit_extended(problem, simple_fit, effect)
 
     def _backward_step(
         self, problem: Problem, fit: Fit, accepted: tuple[str, ...]
@@ -421,6 +492,10 @@ class StepwiseSelection:
     def _needed(self, problem: Problem, fit: Fit, name: str) -> bool:
         """Is the error certainly lower with an effect that extends another than with that other?"""
         return certainly_better((problem, reduced(self.catalogue, problem, fit, name)), (problem, fit))
+
+    def _better_than_part(self, problem: Problem, fit: Fit, name: str) -> bool:
+        """Whether an effect that extends another is `_needed`, as it must be to remain; any other effect is no part's rival."""
+        return not extended(self.catalogue, name) or self._needed(problem, fit, name)
 
     def _stays(self, problem: Problem, simpler: Fit, fit: Fit, name: str) -> bool:
         """Whether an effect still earns its place; one that only acts elsewhere than the simpler one, by the better fit."""

@@ -88,6 +88,14 @@ class Select:
         "The log-likelihood by which such an effect must also be worse to be dropped: three standard errors, if the "
         "difference were noise alone.",
     )
+    simple_first: float = setting(
+        0.8,
+        "1",
+        "An effect that extends another one, and would take the place of a third, gives way to that other one beside the third "
+        "if that gains at least this fraction. In a log of an independent simulator, friction in the gears in the place of "
+        "friction of both wheels gained 34.7 a trial, a lag beside it 33.7; with the first, what was true (a friction that "
+        "fades, and a lag) was not found any more.",
+    )
     clocks_chance: float = setting(
         0.01, "1", f"Probability of a false alarm about clocks that differ between trials; {BY_HAND}."
     )

@@ -60,7 +60,7 @@ def simulate(
         grid = step_grid(left[rows], right[rows], duration[rows], model.dt_s, growth)
         nodes = _integrate(model, grid, poses0[rows])
         if any(model.at("clock")):
-            _sample(poses[rows], taken_at(model, np.cumsum(duration[rows], axis=1)), grid.node_s, nodes)
+            _sample(poses[rows], stamps_of(model, np.cumsum(duration[rows], axis=1)), grid.node_s, nodes)
         else:
             poses[rows] = np.take_along_axis(nodes, grid.ends[:, :, None], axis=1)
     return poses
@@ -83,7 +83,7 @@ def track(
     poses = np.empty((*times.shape, 3))
     for rows in _chunks(len(left)):
         grid = step_grid(left[rows], right[rows], duration[rows], model.dt_s)
-        _sample(poses[rows], taken_at(model, times[rows]), grid.node_s, _integrate(model, grid, poses0[rows]))
+        _sample(poses[rows], stamps_of(model, times[rows]), grid.node_s, _integrate(model, grid, poses0[rows]))
     return Track(times, poses)
 
 
@@ -126,8 +126,8 @@ def _nodes(model: Model, grid: Grid, start: Array, place: Array | None) -> Array
     return np.stack([x, y, driven.heading_rad], axis=2)
 
 
-def taken_at(model: Model, stamped_s: Array, trial: NDArray[np.int64] | None = None) -> Array:
-    """When poses stamped so were really taken: the ``clock`` effects.
+def stamps_of(model: Model, stamped_s: Array, trial: NDArray[np.int64] | None = None) -> Stamps:
+    """When poses stamped so, and their headings, were really taken: the ``clock`` effects.
 
     ``trial``: of which trial each stamp is, where the trials' own clocks are to count.
     """
@@ -137,7 +137,12 @@ def taken_at(model: Model, stamped_s: Array, trial: NDArray[np.int64] | None = N
         if active.trial_values and trial is not None:
             values = dict.fromkeys(values, np.array(active.trial_values)[trial])
         stamps = active.effect.apply(stamps, **values)
-    return stamps.t_s
+    return stamps
+
+
+def taken_at(model: Model, stamped_s: Array, trial: NDArray[np.int64] | None = None) -> Array:
+    """When the positions of poses stamped so were really taken; ``trial`` as in `stamps_of`."""
+    return stamps_of(model, stamped_s, trial).t_s
 
 
 def _chunks(trials: int) -> list[slice]:
@@ -191,8 +196,8 @@ def _sample_times(duration: Array, dense_dt_s: float) -> Array:
     return np.where(times <= total + 1e-9, np.minimum(times, total), np.nan)
 
 
-def _sample(out: Array, times: Array, node_s: Array, nodes: Array) -> None:
+def _sample(out: Array, stamps: Stamps, node_s: Array, nodes: Array) -> None:
     """Poses between nodes lie on the chord: at 5 ms steps that is within micrometres of the arc."""
-    for row in range(len(out)):
-        for axis in range(3):
-            out[row, :, axis] = np.interp(times[row], node_s[row], nodes[row, :, axis])
+    for row, taken_s in enumerate(stamps.t_s):
+        for axis, times in enumerate((taken_s, taken_s, taken_s - stamps.heading_late_s)):
+            out[row, :, axis] = np.interp(times, node_s[row], nodes[row, :, axis])

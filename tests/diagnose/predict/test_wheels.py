@@ -45,6 +45,7 @@ def asked_about():
         model.with_effect("camera-scale", factor=1.1),
         model.with_effect("marker-offset", forward_m=0.02, left_m=-0.01),
         model.with_effect("clock-offset", offset_s=0.06),
+        model.with_effect("heading-delay", delay_s=0.06),
         clocks.with_trial_values([0.02, -0.05, 0.1]),
         clocks.with_trial_values([0.02, 0.05, 0.1]),
         model.with_effect("side-slip", slip_s=0.1),

@@ -69,7 +69,8 @@ def test_an_effect_is_exchanged_only_for_what_loses_less_on_held_out_trials_by_m
     search = StepwiseSelection.__new__(StepwiseSelection)
     fit, tried = (SimpleNamespace(held_out=np.array([6.0, 4.0 - less]), model=None) for less in (0.0, gained))
     exchanged = {("a", "b"): [("b", "c", tried)], ("a", "c"): []}
-    search._exchanges = SimpleNamespace(of=lambda _problem, _fit, accepted: exchanged[accepted])
+    search.catalogue = {}
+    search._exchanges = SimpleNamespace(of=lambda _problem, _fit, accepted: exchanged[accepted], longer=lambda *_: [])
     monkeypatch.setattr(search, "_may_stay", lambda *_: True)
     monkeypatch.setattr(search, "_rejected", lambda *_, **__: "")
     monkeypatch.setattr(search, "_refit_with_noise", lambda *_: ("settled", tried))
@@ -81,7 +82,8 @@ def test_an_exchange_that_asks_for_too_much_once_it_has_settled_gives_way_to_the
     search = StepwiseSelection.__new__(StepwiseSelection)
     fit, best, second = (SimpleNamespace(held_out=np.array([6.0, 4.0 - less]), model=less) for less in (0.0, 3.0, 2.0))
     exchanged = {("a", "b"): [("b", "c", best), ("b", "d", second)], ("a", "d"): [("d", "c", best)]}
-    search._exchanges = SimpleNamespace(of=lambda _problem, _fit, accepted: exchanged[accepted])
+    search.catalogue = {}
+    search._exchanges = SimpleNamespace(of=lambda _problem, _fit, accepted: exchanged[accepted], longer=lambda *_: [])
     monkeypatch.setattr(search, "_may_stay", lambda *_: True)
     problem = SimpleNamespace(pose_filter=SimpleNamespace(noise=None))
     monkeypatch.setattr(search, "_refit_with_noise", lambda model, _: (problem, SimpleNamespace(model=model)))
@@ -141,8 +143,12 @@ def test_a_longer_effect_takes_the_place_of_what_was_found_and_stands_beside_wha
     longer = SimpleNamespace(name="longer-lag")
     fit = SimpleNamespace(model=search.model)
     place = {"longer-lag": (str(b"lag", "ascii"), "with the lag")}  # equal to the name above, and another object
+    search._exchanges = SimpleNamespace(fitted=lambda *_: None)
     assert search._tried("problem", fit, place, longer) == ("added", "longer-lag")
     assert asked == [("problem", "with the lag", longer, stays)]
+    search._exchanges = SimpleNamespace(fitted=lambda *asked_of: asked_of)
+    assert search._tried("problem", fit, place, longer) == (("problem", fit, "lag", "longer-lag"), "longer-lag")
+    assert len(asked) == 1
 
 
 def test_a_look_back_asks_of_every_effect_but_the_newest_whether_it_stays(monkeypatch):
@@ -235,3 +241,128 @@ def test_a_longer_effect_that_lowers_no_error_goes_back_to_the_one_that_it_exten
         monkeypatch.setattr(stepwise, name, lambda *_, answer=answer: answer)
     problem = SimpleNamespace(pose_filter=SimpleNamespace(noise=None))
     assert search._backward_step(problem, fit, ("longer", "b"))[2] == kept
+
+
+def an_effect(name, numbers, extends="", contains=(), lookalikes=()):
+    return SimpleNamespace(name=name, parameters=[None] * numbers, extends=extends, contains=contains, lookalikes=lookalikes)
+
+
+def with_effects(*effects, **more):
+    return SimpleNamespace(model=SimpleNamespace(effects=[SimpleNamespace(effect=effect) for effect in effects]), **more)
+
+
+def test_an_effect_is_exchanged_for_one_with_no_more_numbers_that_extends_what_could_nearly_stand_there(monkeypatch):
+    """A friction that slides (three numbers) and a clock (one) for a friction of both wheels, and for what extends that one."""
+    extending = [an_effect("unlike", 2, "friction"), an_effect("cold", 3, "friction"), an_effect("in-gears", 4, "friction")]
+    fit = with_effects(sliding := an_effect("sliding", 3), clock := an_effect("clock", 1))
+    known = {effect.name: effect for effect in (*extending, sliding, clock)}
+    one, begun = Exchanges(None, known, known, lambda _: None), []
+    near = [("clock", "friction", "friction for the clock"), ("sliding", "friction", "friction for sliding")]
+    near.append(("sliding", "lag", "a lag for sliding"))
+    monkeypatch.setattr(one, "of", lambda *_: near)
+
+    def extended(_problem, base, effect):
+        begun.append(base)
+        return f"{effect.name} from {base}"
+
+    monkeypatch.setattr(exchanges, "fit_extended", extended)
+    accepted, problem = ("sliding", "clock"), SimpleNamespace()
+    found = [("sliding", name, f"{name} from friction for sliding") for name in ("unlike", "cold")]
+    assert one.longer(problem, fit, accepted) == one.longer(problem, fit, accepted) == found
+    assert begun == ["friction for sliding"] * 2
+    assert one.fitted(problem, fit, "sliding", "cold") == "cold from friction for sliding"
+    for other in ((problem, fit, "clock", "cold"), (problem, with_effects(), "sliding", "cold"), (None, fit, "sliding", "cold")):
+        assert one.fitted(*other) is None
+    one.forget()
+    assert one.fitted(problem, fit, "sliding", "cold") is None
+
+
+@pytest.mark.parametrize(("better", "ends"), [(True, ("a", "longer")), (False, ("a", "b"))])
+def test_an_exchange_for_a_longer_effect_must_lower_the_error_of_the_one_that_it_extends(monkeypatch, better, ends):
+    search = StepwiseSelection.__new__(StepwiseSelection)
+    search.catalogue = {"longer": SimpleNamespace(extends="lag"), "lag": SimpleNamespace(extends="")}
+    fit, tried = (SimpleNamespace(held_out=np.array([10.0 - less]), model=None) for less in (0.0, 3.0))
+    longer = {("a", "b"): [("b", "longer", tried)], ("a", "longer"): []}
+    search._exchanges = SimpleNamespace(of=lambda *_: [], longer=lambda _problem, _fit, accepted: longer[accepted])
+    monkeypatch.setattr(search, "_may_stay", lambda *_: True)
+    monkeypatch.setattr(search, "_rejected", lambda *_, **__: "")
+    monkeypatch.setattr(search, "_needed", lambda *_: better)
+    monkeypatch.setattr(search, "_refit_with_noise", lambda *_: ("settled", tried))
+    problem = SimpleNamespace(pose_filter=SimpleNamespace(noise=None))
+    assert search._exchange_step(problem, fit, ("a", "b"))[2] == ends
+
+
+def ranked(**gains):
+    """Candidates by name, each with its gain."""
+    named = ((name.replace("_", "-"), SimpleNamespace(model=name), gain) for name, gain in gains.items())
+    return [Candidate(name, fit, SimpleNamespace(elpd_diff=gain)) for name, fit, gain in named]
+
+
+def choosing(monkeypatch, lower):
+    """A search that knows friction, what is in gears (it extends a lag), a lag and a slip; ``lower``: what lowers the error."""
+    search = StepwiseSelection.__new__(StepwiseSelection)
+    search.predictor = SimpleNamespace(screening=None)
+    names = (("friction", "", ()), ("lag", "", ()), ("gears", "lag", ("turn-lag",)), ("turn-lag", "lag", ()), ("slip", "", ()))
+    search.catalogue = {name: an_effect(name, 1, extends, contains) for name, extends, contains in names}
+    monkeypatch.setattr(stepwise, "variant", lambda *_: False)
+    monkeypatch.setattr(stepwise, "certainly_better", lambda _before, settled: settled[1] in lower)
+    monkeypatch.setattr(search, "_earned", lambda *_: True)
+    monkeypatch.setattr(search, "_rejected", lambda *_, **__: "")
+    monkeypatch.setattr(search, "_needed", lambda *_: True)
+    monkeypatch.setattr(search, "_refit_with_noise", lambda model, _: ("problem", model))
+    problem = SimpleNamespace(pose_filter=SimpleNamespace(noise=None))
+    return lambda tried, place: search._chosen(problem, None, tried, 0.0, place, 0)[0].selected
+
+
+@pytest.mark.parametrize(
+    ("lag", "instead_of", "selected"), [(9.0, "friction", "lag"), (7.0, "friction", "gears"), (9.0, "lag", "gears")]
+)
+def test_what_takes_a_thirds_place_waits_where_the_simpler_one_gains_nearly_as_much(monkeypatch, lag, instead_of, selected):
+    chosen = choosing(monkeypatch, {"gears", "lag"})
+    assert chosen(ranked(gears=10.0, lag=lag), {"gears": (instead_of, None)}) == selected
+    assert chosen(ranked(gears=10.0, lag=lag), {"gears": (instead_of, None), "lag": ("slip", None)}) == "gears"
+
+
+@pytest.mark.parametrize(("lower", "selected"), [((), ""), (("slip",), "slip"), (("turn_lag",), "turn-lag")])
+def test_behind_one_that_lowers_no_error_nothing_comes_in_that_lowers_none_either(monkeypatch, lower, selected):
+    """Turns that lag less than straight lines look a little like a slip; the lag that says so comes before it."""
+    chosen = choosing(monkeypatch, lower)
+    assert chosen(ranked(turn_lag=2.0, slip=1.0), {"turn-lag": ("lag", None)}) == selected
+    assert chosen(ranked(slip=2.0, turn_lag=1.0), {"turn-lag": ("lag", None)}) == "slip"
+
+
+@pytest.mark.parametrize(
+    ("held_out", "stays", "ends"),
+    [
+        ({"lag": 9.4}, True, ("c", "lag")),
+        ({"lag": 9.6}, True, ("a", "b", "c")),
+        ({"lag": 9.4}, False, ("a", "b", "c")),
+        ({"lag": 9.4, "turn-lag": 8.8}, True, ("c", "turn-lag")),
+        ({"lag": 9.4, "gears": 8.0}, True, ("c", "lag")),  # four numbers in the place of two
+    ],
+)
+def test_one_effect_takes_the_place_of_two_that_look_like_it(monkeypatch, held_out, stays, ends):
+    search = StepwiseSelection.__new__(StepwiseSelection)
+    search.predictor, search.tick = SimpleNamespace(screening=None), lambda _: None
+    search.catalogue = {
+        "a": an_effect("a", 1, lookalikes=("lag", "b")),
+        "b": an_effect("b", 1, lookalikes=("lag", "slip")),
+        "c": an_effect("c", 1, lookalikes=("slip",)),
+        "lag": an_effect("lag", 1),
+        "turn-lag": an_effect("turn-lag", 2, "lag"),
+        "gears": an_effect("gears", 4, "lag"),
+    }
+    search._worth = search.catalogue
+    fits = {name: SimpleNamespace(held_out=np.array([loss]), model=name) for name, loss in held_out.items()}
+    worse = SimpleNamespace(held_out=np.array([99.0]), model="")
+    monkeypatch.setattr(stepwise, "fit_with", lambda _problem, _base, effect: fits.get(effect.name, worse))
+    monkeypatch.setattr(stepwise, "fit_extended", lambda _problem, _base, effect: fits.get(effect.name, worse))
+    monkeypatch.setattr(search, "_may_stay", lambda *_: stays)
+    monkeypatch.setattr(search, "_rejected", lambda *_, **__: "")
+    monkeypatch.setattr(search, "_refit_with_noise", lambda model, _: ("problem", fits[model]))
+    without = SimpleNamespace(without=lambda _: without)
+    fit = SimpleNamespace(held_out=np.array([10.0]), model=without)
+    problem = SimpleNamespace(fit=lambda _: None, pose_filter=SimpleNamespace(noise=None))
+    assert search._merge_step(problem, fit, ("a", "b", "c"))[2] == ends
+    search.predictor = SimpleNamespace(screening=object())
+    assert search._merge_step(problem, fit, ("a", "b", "c"))[2] == ("a", "b", "c")
