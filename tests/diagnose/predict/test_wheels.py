@@ -119,3 +119,14 @@ def test_a_late_command_and_a_late_clock_are_alike_in_long_steps(beside):
     apart = predictor.steps(late.arranged()).body - predictor.steps(clock.arranged()).body
     changed = predictor.steps(late.arranged()).body - predictor.steps(lagging).body
     assert np.abs(apart).max() < 0.03 * np.abs(changed).max()
+
+
+@pytest.mark.parametrize("delay_s", [0.06, -0.1])
+def test_late_headings_are_predicted_as_the_simulation_sees_them(delay_s):
+    model = NOMINAL.with_effect("heading-delay", delay_s=delay_s)
+    tracks = tracks_of(measured(model, trials=3, seed=4, noise=(0.0, 0.0), jitter=0.0))
+    seen, predictor = wheels.displacements(tracks.pose, tracks.is_first), WheelPredictor(tracks)
+    away = np.abs(predictor.steps(model).body - seen).max(axis=0)
+    assert (away < [1e-4, 1e-4, 3e-3]).all()
+    other = np.abs(predictor.steps(NOMINAL.with_effect("heading-delay", delay_s=-delay_s)).body - seen).max(axis=0)
+    assert (other[1:] > [5e-4, 3e-2]).all()  # forwards, the sign of an angle hardly matters

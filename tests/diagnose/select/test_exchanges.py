@@ -366,3 +366,30 @@ def test_one_effect_takes_the_place_of_two_that_look_like_it(monkeypatch, held_o
     assert search._merge_step(problem, fit, ("a", "b", "c"))[2] == ends
     search.predictor = SimpleNamespace(screening=object())
     assert search._merge_step(problem, fit, ("a", "b", "c"))[2] == ("a", "b", "c")
+
+
+def test_where_nothing_comes_in_two_effects_may_give_way_to_one_and_the_search_goes_on(monkeypatch):
+    search = StepwiseSelection.__new__(StepwiseSelection)
+    search.model, search._exchanges = None, SimpleNamespace(entry=None)
+    came, asked = {(): "a", ("a",): "b", ("c",): "d"}, []
+    fit, problem = SimpleNamespace(free=(), model=None), SimpleNamespace()
+
+    def next_step(_problem, _fit, accepted):
+        step = SimpleNamespace(selected=came.get(accepted, ""), instead_of="")
+        step.slim = lambda: step
+        return step, problem, fit
+
+    def merged(_problem, _fit, accepted):
+        asked.append(accepted)
+        return problem, fit, ("c",) if accepted == ("a", "b") else accepted
+
+    monkeypatch.setattr(search, "_refit_with_noise", lambda *_: (problem, fit))
+    monkeypatch.setattr(search, "_next_step", next_step)
+    monkeypatch.setattr(search, "_exchange_step", lambda *state: state)
+    monkeypatch.setattr(search, "_backward_step", lambda *state: state)
+    monkeypatch.setattr(search, "_merge_step", merged)
+    monkeypatch.setattr(search, "_ended", lambda _problem, _fit, accepted, _steps: accepted)
+    assert search._select() == ("c", "d")
+    assert asked == [("a", "b"), ("c", "d")]
+    monkeypatch.setattr(stepwise, "MOST", 2)  # as many effects as may be are merged, too
+    assert search._select() == ("c", "d")
