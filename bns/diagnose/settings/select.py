@@ -91,10 +91,10 @@ class Select:
     simple_first: float = setting(
         0.8,
         "1",
-        "An effect that extends another one, and would take the place of a third, gives way to that other one beside the third "
-        "if that gains at least this fraction. In a log of an independent simulator, friction in the gears in the place of "
-        "friction of both wheels gained 34.7 a trial, a lag beside it 33.7; with the first, what was true (a friction that "
-        "fades, and a lag) was not found any more.",
+        "An effect that extends a simpler one and would replace an accepted effect is passed over if the simpler one, added to "
+        "the accepted effects, gains at least this fraction. In a log of an independent simulator, friction in the gears instead "
+        "of friction of both wheels gained 34.7 per trial, an added lag 33.7; after the first, the true explanation (a friction "
+        "that fades, and a lag) was not found.",
     )
     clocks_chance: float = setting(
         0.01, "1", f"Probability of a false alarm about clocks that differ between trials; {BY_HAND}."
