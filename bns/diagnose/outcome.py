@@ -115,7 +115,7 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
                 stands, found = _standing(shorter, predictor, given, tick), again
         found = _believable(found, stands, predictor, response)
         next_to, lost, new, errors = _beside_terms(found, stands, predictor, given, tick)
-        if new and errors is not None and not _falls_with_terms(errors):
+        if new and errors is not None and not errors.falls:
             again = _established(stands.selection, predictor, stands.rest, response, new)
             if again is not None:
                 found = _believable(again, stands, predictor, response, new)
@@ -160,7 +160,7 @@ def _beside_terms(
 ) -> tuple[Standing, tuple[str, ...], tuple[str, ...], PairedErrors | None]:
     """The effects that stand beside terms, those that they left nothing to do, those that they brought to light, and the errors.
 
-    What only the terms brought to light is judged with them (`_falls_with_terms`): without them it may lower no error.
+    What only the terms brought to light is judged with them, from the model as given: without them it may lower no error.
     """
     selection = stands.selection
     lost = tuple(name for name in selection.accepted if name not in found.names)
@@ -387,12 +387,6 @@ def _matters(errors: PairedErrors) -> bool:
     """Do the terms certainly lower the error at one horizon, by as much as is asked of an effect (`least_fall`)?"""
     before = next((at.models[-2].name for at in errors.horizons.values()), "")
     return fall_matters(errors, before, WITH_TERMS)
-
-
-def _falls_with_terms(errors: PairedErrors) -> bool:
-    """Does the held-out error fall from the model as given to the one with the effects and the terms?"""
-    names = next(([one.name for one in at.models] for at in errors.horizons.values()), [])
-    return bool(names) and errors.between(names[0], WITH_TERMS)
 
 
 def _within_noise(errors: PairedErrors) -> bool:

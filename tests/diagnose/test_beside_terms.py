@@ -4,13 +4,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bns.diagnose import outcome
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import listed
+from bns.diagnose.predict.paired_errors import paired_errors
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals import established
+from bns.diagnose.residuals.established import Established
 from bns.diagnose.residuals.symbolic import fitted
+from bns.diagnose.select.result import SelectionResult
 from tests.diagnose.worlds import BASE_M, FRAME_S, NOMINAL, hidden, measured
 
 MISMATCH = 1.012
@@ -68,6 +72,26 @@ def curved(trials=20, commands=9, seed=3):
         columns = {"trial": trial, "t_s": t_s[::8], "left_m_s": told[of[::8], 0], "right_m_s": told[of[::8], 1]}
         rows.append(pd.DataFrame(columns | dict(zip(("x_m", "y_m", "heading_rad"), poses.T, strict=True))))
     return pd.concat(rows, ignore_index=True)
+
+
+@pytest.mark.parametrize("helps", [True, False])
+def test_what_terms_bring_to_light_stays_where_the_error_falls_from_the_model_as_given(lopsided, monkeypatch, helps):
+    """With mocked parts: the effect alone is worse than none; with the terms beside it the error is lower, or still higher."""
+    problem, _, nominal = lopsided
+    predictor, with_term = problem.predictor, term(lopsided, "k * v * abs(v)", "v")
+    with_effect = problem.fit(with_term.fit.model.with_effect("wheel-mismatch", ratio=1.0))
+    found = Established(("wheel-mismatch",), (with_term,), problem, with_effect)
+    without = Established((), (with_term,), problem, with_term.fit)
+    ratios = {"as given": 1.0, outcome.WITH_EFFECTS: 1.05, outcome.WITH_TERMS: MISMATCH if helps else 1.03}
+    steps = [(name, predictor.steps(NOMINAL.with_effect("wheel-mismatch", ratio=one))) for name, one in ratios.items()]
+    barred = []
+    monkeypatch.setattr(outcome, "_established", lambda *given: (barred.extend(given[4]), without)[1] if given[4:] else found)
+    monkeypatch.setattr(outcome, "_believable", lambda found, *_: found)
+    monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: paired_errors(predictor, steps))
+    ended = outcome.outcome_of(SelectionResult(problem, nominal, nominal, (), ()), predictor, NOMINAL, lambda _: None)
+    assert ended.selection.accepted == (("wheel-mismatch",) if helps else ())
+    assert barred == ([] if helps else ["wheel-mismatch"])
+    assert ended.terms
 
 
 @pytest.mark.slow

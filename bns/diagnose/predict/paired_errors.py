@@ -113,9 +113,11 @@ class HorizonErrors:
         return next(m.rms_m for m in self.models if m.name == name)
 
     def change_between(self, before: str, after: str) -> Change:
-        """Of two models next to each other."""
+        """Of two models next to each other; ValueError for others, whose change is not worked out."""
         names = [m.name for m in self.models]
-        return self.changes[names.index(before)] if names.index(after) == names.index(before) + 1 else _UNKNOWN
+        if names.index(after) != names.index(before) + 1:
+            raise ValueError(f"{after!r} does not follow {before!r} in {names}.")
+        return self.changes[names.index(before)]
 
 
 @dataclass(frozen=True)

@@ -261,3 +261,13 @@ def test_large_errors_keep_the_columns_of_the_table_apart(before_m, median_m, ch
     assert shown[0] in first
     assert shown[1] in second
     assert "46.10 (20.40)" in second
+
+
+def test_the_change_between_models_that_do_not_follow_each_other_is_no_silent_unknown(table):
+    """It once counted as an error that does not fall."""
+    predictor = WheelPredictor(tracks(table))
+    steps = predictor.steps(NOMINAL)
+    errors = paired_errors(predictor, [("one", steps), ("two", steps), ("three", steps)])
+    assert not errors.between("two", "three")
+    with pytest.raises(ValueError, match="'three' does not follow 'one'"):
+        errors.between("one", "three")
