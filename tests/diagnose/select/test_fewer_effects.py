@@ -101,34 +101,13 @@ def test_an_effect_that_a_term_had_hidden_stands_though_it_lowers_no_error_witho
     term = fitted(problem, nothing.fit, "v", "k * v * abs(w)")
     fit = problem.fit(term.fit.model.with_effect("yaw-bias", rate_rad_s=0.0))
     found = outcome.Established(("yaw-bias",), (term,), problem, fit)
-    monkeypatch.setattr(outcome, "_established", lambda *_: found)
+    monkeypatch.setattr(outcome, "_established", lambda *given: found if len(given) == 4 else pytest.fail("searched again"))
     monkeypatch.setattr(outcome, "_believable", lambda *_: found)
     monkeypatch.setattr(outcome, "_matters", lambda _: True)
     monkeypatch.setattr(outcome, "_within_noise", lambda _: False)
-    monkeypatch.setattr(PairedErrors, "falls", False)
+    with_terms = lambda errors: any(one.name == outcome.WITH_TERMS for one in errors.horizons["trial"].models)  # noqa: E731
+    monkeypatch.setattr(PairedErrors, "falls", property(with_terms))
     assert outcome.outcome_of(nothing, late, NOMINAL, lambda _: None).selection.accepted == ("yaw-bias",)
-
-
-@pytest.mark.parametrize("falls", [True, False])
-def test_what_a_term_brought_to_light_goes_where_the_error_does_not_fall_with_both(late, monkeypatch, falls):
-    """Asked again, the search with terms may not bring it to light."""
-    nothing = standing(late)
-    problem = nothing.problem
-    term = fitted(problem, nothing.fit, "v", "k * v * abs(w)")
-    fit = problem.fit(term.fit.model.with_effect("yaw-bias", rate_rad_s=0.0))
-
-    def found(_selection, _predictor, _rest, _response, barred=()):
-        return outcome.Established(() if "yaw-bias" in barred else ("yaw-bias",), (term,), problem, term.fit if barred else fit)
-
-    monkeypatch.setattr(outcome, "_established", found)
-    monkeypatch.setattr(outcome, "_believable", lambda found, *_: found)
-    monkeypatch.setattr(outcome, "_matters", lambda _: True)
-    monkeypatch.setattr(outcome, "_within_noise", lambda _: False)
-    monkeypatch.setattr(PairedErrors, "falls", False)
-    whole = ("as given", outcome.WITH_TERMS)
-    monkeypatch.setattr(PairedErrors, "between", lambda _, before, after: (before, after) == whole and falls)
-    kept = outcome.outcome_of(nothing, late, NOMINAL, lambda _: None).selection.accepted
-    assert kept == (("yaw-bias",) if falls else ())
 
 
 def test_with_fewer_effects_nothing_competes_until_it_is_asked_for(late):
