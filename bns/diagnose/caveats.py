@@ -405,6 +405,8 @@ def _on_rest(rest: Unexplained, tracks: Tracks) -> Iterator[str]:
         begun = f"{some} have moments with more than {FAR:g} times the usual error ({worst}{more})"
         if rest.shared is not None:
             yield f"{begun}. What they share: {rest.shared.in_words}. Look at what the robot does after such commands."
+        elif rest.place is not None:
+            yield f"{begun}. What they share: {rest.place.in_words}. Look at what differs there: the floor, tracking, a cable."
         elif len(rest.outliers) >= OFTEN * len(tracks):
             yield f"{begun}. That is too often for accidents: look for what they share, such as a place or a change of command."
         else:

@@ -130,6 +130,7 @@ class Diagnosis:
             "outliers": [vars(o) for o in self.rest.outliers],
             "command_times": asdict(self.rest.command_times) if self.rest.command_times else None,
             "outliers_share": {**vars(self.rest.shared), "in_words": self.rest.shared.in_words} if self.rest.shared else None,
+            "outliers_place": {**vars(self.rest.place), "in_words": self.rest.place.in_words} if self.rest.place else None,
             "notes": list(self.notes),
             "calibration": numbers_of(self.calibration) if self.calibration else {},
             "wheel_sizes": {
@@ -148,7 +149,7 @@ class Diagnosis:
     @property
     def moments(self) -> tuple[str, ...]:
         """In clauses: commands at times that scatter or follow something, moments that stand out, and what these share."""
-        moments, times, shared = self.rest.outliers, self.rest.command_times, self.rest.shared
+        moments, times = self.rest.outliers, self.rest.command_times
         scattered = (times.in_words,) if times is not None else ()
         if not moments or self.selection is None:
             return scattered
@@ -156,7 +157,8 @@ class Diagnosis:
         often = "the error is large at some moments, too often for accidents"
         what = often if len(moments) >= OFTEN * trials else "the error is large for a moment"
         worst = f"in {len(moments)} of {trials} trials {what}; the worst is {moments[0].in_words}"
-        return tuple(filter(None, (*scattered, worst, one_wheel(moments), shared.in_words if shared is not None else "")))
+        share = self.rest.shared or self.rest.place
+        return tuple(filter(None, (*scattered, worst, one_wheel(moments), share.in_words if share is not None else "")))
 
     @property
     def numbers(self) -> dict[str, dict[str, dict[str, Any]]]:

@@ -11,6 +11,7 @@ from one end of the window to the other is many times as far from the prediction
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -20,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.data.robust import robust_sd
-from bns.diagnose.data.tracks import Array
+from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.estimate.fit import Fit, Problem
 from bns.diagnose.residuals.unforeseen import unforeseen_way, ways
 from bns.diagnose.settings import DEFAULTS
@@ -119,11 +120,16 @@ def outliers(problem: Problem, fit: Fit, judged: JudgedWindows | None = None) ->
     """
     tracks, judged = problem.predictor.tracks, judged or judged_windows(problem, fit)
     start, size = judged.start, judged.size
-    worst = {int(tracks.trial[start[i]]): i for i in np.argsort(size) if judged.stands_out[i]}
+    worst = worst_of_trials(tracks, judged)
     if len(worst) < TRIALS:
         return []
     found = [moment_at(problem, fit, int(start[i]), float(size[i])) for i in worst.values()]
     return sorted(found, key=lambda o: -o.size)
+
+
+def worst_of_trials(tracks: Tracks, judged: JudgedWindows) -> dict[int, int]:
+    """The worst of the windows that stand out, of each trial that has one; trial to window."""
+    return {int(tracks.trial[judged.start[i]]): int(i) for i in np.argsort(judged.size) if judged.stands_out[i]}
 
 
 def moment_at(problem: Problem, fit: Fit, start: int, size: float) -> Outlier:
@@ -148,15 +154,21 @@ def moment_at(problem: Problem, fit: Fit, start: int, size: float) -> Outlier:
 
 
 def one_wheel(moments: Sequence[Outlier]) -> str:
-    """The wheel that alone did not turn as predicted in most of them, in a clause; "" where chance would do the same."""
-    sides = [moment.wheel for moment in moments if moment.wheel]
-    side = max(("left", "right"), key=sides.count)
-    same = [moment for moment in moments if moment.wheel == side]
-    ways = sum(comb(len(sides), k) for k in range(len(same), len(sides) + 1))
-    if not same or 2 * ways >= CHANCE * 2 ** len(sides):
+    """The wheel that alone turned less than predicted, or more, in most of them, in a clause; "" where chance would do the same.
+
+    A wheel that turns less at times and more at others is no wheel that slips: a mistaken marker beside it seems to turn so.
+    """
+    ways = [(moment.wheel, _less(moment)) for moment in moments if moment.wheel]
+    side, less = max(itertools.product(("left", "right"), (True, False)), key=ways.count)
+    same = ways.count((side, less))
+    as_many = sum(comb(len(ways), k) for k in range(same, len(ways) + 1))
+    if not same or 2 * as_many >= CHANCE * 2 ** len(ways):
         return ""
-    short = sum(moment.left_m if side == "left" else moment.right_m for moment in same) < 0.0
-    return f"in {len(same)} of these moments the {side} wheel alone turned {'less' if short else 'more'} than predicted"
+    return f"in {same} of these moments the {side} wheel alone turned {'less' if less else 'more'} than predicted"
+
+
+def _less(moment: Outlier) -> bool:
+    return (moment.left_m if moment.wheel == "left" else moment.right_m) < 0.0
 
 
 def _windows(first: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -14,6 +14,7 @@ from bns.diagnose.residuals.autocorrelation import Autocorrelation, autocorrelat
 from bns.diagnose.residuals.command_times import CommandTimes, command_times
 from bns.diagnose.residuals.moments_share import SharedCause, shared_cause
 from bns.diagnose.residuals.outliers import Outlier, judged_windows, outliers
+from bns.diagnose.residuals.shared_place import SharedPlace, shared_place
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,8 @@ class Unexplained:
     """The scatter of the times at which commands take effect: no model predicts it."""
     shared: SharedCause | None = None
     """What the changes of command share that such moments follow."""
+    place: SharedPlace | None = None
+    """Where, or when in their trials, such moments begin."""
 
     @property
     def any(self) -> bool:
@@ -41,13 +44,14 @@ NOTHING = Unexplained((), None, ())
 def unexplained(problem: Problem, fit: Fit, seen: Sequence[ResidualDependence]) -> Unexplained:
     """Of the patterns ``seen`` in a fitted model, and of its innovations, what is too large and too certain to be luck."""
     largest = autocorrelations(problem, fit)[0]
-    moments, shared = _moments(problem, fit)
+    moments, shared, place = _moments(problem, fit)
     return Unexplained(
         tuple(significant_dependence(list(seen))),
         largest if largest.significant else None,
         moments,
         command_times(problem, fit),
         shared,
+        place,
     )
 
 
@@ -56,12 +60,12 @@ def without_moments_explained(rest: Unexplained, problem: Problem, fit: Fit) -> 
     if not rest.outliers:
         return rest
     trials = {moment.trial for moment in rest.outliers}
-    moments, shared = _moments(problem, fit)
+    moments, shared, place = _moments(problem, fit)
     left = tuple(moment for moment in moments if moment.trial in trials)
-    return replace(rest, outliers=left, shared=shared if left else None)
+    return replace(rest, outliers=left, shared=shared if left else None, place=place if left else None)
 
 
-def _moments(problem: Problem, fit: Fit) -> tuple[tuple[Outlier, ...], SharedCause | None]:
+def _moments(problem: Problem, fit: Fit) -> tuple[tuple[Outlier, ...], SharedCause | None, SharedPlace | None]:
     windows = judged_windows(problem, fit)
     moments = tuple(outliers(problem, fit, windows))
-    return moments, shared_cause(problem, windows) if moments else None
+    return (moments, shared_cause(problem, windows), shared_place(problem, windows)) if moments else ((), None, None)

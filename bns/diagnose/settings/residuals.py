@@ -262,7 +262,8 @@ class Residuals(CommandTimes):
         8,
         "changes",
         "So many changes of command at least must be followed by a moment that stands out, and so many by none, before the tool "
-        "says what the first ones share: fewer could share one of many properties by chance.",
+        "says what the first ones share, and so many trials must have such a moment before it says where these begin: fewer "
+        "could share one of many properties by chance.",
     )
     share_pure: float = setting(
         0.8,
@@ -271,7 +272,7 @@ class Residuals(CommandTimes):
         "fraction of such moments must follow one beyond it. Two robots of another hand whose motors stop for 0.2 s after large "
         "steps had 0.90 and 0.88; of robots of that hand with a lag, a delay, a limit of speed, a marker that sways, steps that "
         "are ignored and motors that tire, asked without these effects, the largest was 0.77. With an acceleration limit it was "
-        "0.87: large steps are what it acts on.",
+        "0.87: large steps are what it acts on. Of moments that share a place, at least this fraction must begin there.",
     )
     worst_share: float = setting(
         0.03,

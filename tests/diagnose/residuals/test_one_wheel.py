@@ -67,3 +67,10 @@ def test_it_is_among_what_is_said_of_moments():
     selection = type("Selection", (), {"problem": problem})()
     found = Diagnosis("unlisted", selection, rest=replace(NOTHING, outliers=moments))
     assert found.moments[1] == "in 8 of these moments the right wheel alone turned less than predicted"
+
+
+def test_a_wheel_that_turns_less_at_times_and_more_at_others_is_not_named():
+    """A marker that is mistaken behind a line does that, at the way there and at the way back."""
+    less, more = replace(MOMENT, left_m=-0.02), replace(MOMENT, left_m=0.02)
+    assert one_wheel([less] * 12 + [more] * 9) == ""
+    assert one_wheel([less] * 12 + [more]) == "in 12 of these moments the left wheel alone turned less than predicted"

@@ -178,10 +178,12 @@ def test_moments_that_a_term_describes_are_none_unless_it_is_rejected(monkeypatc
     monkeypatch.setattr(outcome, "unexplained", lambda *_: left)
     monkeypatch.setattr(rest_module, "judged_windows", lambda _, fit: fit)
     monkeypatch.setattr(rest_module, "shared_cause", lambda *_: "what is left of it")
+    monkeypatch.setattr(rest_module, "shared_place", lambda *_: "where it is left")
     monkeypatch.setattr(rest_module, "outliers", lambda _, fit, windows: [moments["b"], moments["c"]] if fit == windows else [])
     ended = outcome.outcome_of(searched, predictor(), NOMINAL, lambda _: None)
     assert [one.trial for one in ended.rest.outliers] == list(stay)
     assert ended.rest.shared == ("what they share" if rises else "what is left of it")
+    assert ended.rest.place == (None if rises else "where it is left")
 
 
 @pytest.mark.parametrize("better", [True, False])
