@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtr
 
+from bns.diagnose.data.split_trials import finer
 from bns.diagnose.data.stamps import stamp_scatter
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.data.variables import bare, label, velocity
@@ -101,7 +102,8 @@ def notes_on(
     yield from _on_undescribed(found)
     if hint is not None:
         more = int(np.ceil(len(tracks) * max((3.2 / max(hint.paired_comparison.z, 0.5)) ** 2 - 1, 0.5)))
-        yield f"{hint.name} may be missing, but {len(tracks)} trials are too few to decide; about {more} more would decide."
+        few = f"{hint.name} may be missing, but {len(tracks)} trials are too few to decide; about {more} more would decide."
+        yield few + finer(tracks.duration_s.sum(axis=1))
     for c in selection.steps[0].ranking if not selection.accepted else ():  # what is found explains the others' odd numbers
         if c.rejected_because and c.paired_comparison.elpd_diff > NOTABLE * float(selection.nominal.losses.mean()):
             yield (

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from bns.diagnose.caveats import notes_on, on_many_apart, on_worst
+from bns.diagnose.data.split_trials import finer
 from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.estimate.calibration import calibrated, wheel_sizes
 from bns.diagnose.estimate.cancelling import cancelled
@@ -357,7 +358,7 @@ def too_little(tracks: Tracks, fewest: int) -> str:
     if len(tracks) < fewest:
         return (
             f"{len(tracks)} trial{'' if len(tracks) == 1 else 's'}: anything they show could be due to chance. At least {fewest} "
-            "trials are needed; 20 or more reveal large effects, 60 small ones."
+            f"trials are needed; 20 or more reveal large effects, 60 small ones.{finer(tracks.duration_s.sum(axis=1))}"
         )
     frames = np.diff(tracks.first)
     if np.median(frames) < 2:

@@ -171,10 +171,6 @@ def _check_trials(tree: Mapping[str, Any]) -> None:
         raise DataError(
             f"trials is {shown(split)}; write one of {{standing_s: 1}}, {{lasting_s: 20}}, {{gap_s: 2}}."
         )
-    if "trial" in tree["columns"]:
-        raise DataError(
-            f"trials are cut by {next(iter(split))} and named by a column; leave out one of the two."
-        )
 
 
 def _check_also(rules: LocatedMapping, number: int, other: Any) -> None:

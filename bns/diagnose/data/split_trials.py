@@ -12,6 +12,7 @@ from bns.measurements import COMMANDS, POSE, RUN_UP, SESSION
 
 STILL_M_S = DEFAULTS.data.still_m_s
 KEPT_S = DEFAULTS.data.kept_standing_s
+PIECE_S = DEFAULTS.data.guess_cuts[-1]
 RUN_UP_S = DEFAULTS.data.run_up_taken_s
 
 
@@ -21,15 +22,28 @@ def split(table: pd.DataFrame, by: str, seconds: float) -> pd.DataFrame:
     ``by``: `standing_s` cuts wherever the robot is told to stand for so long (or told nothing) and leaves out all but the
     `KEPT_S` around a drive; `gap_s` where so long nothing was written; `lasting_s` into pieces of that length, which begin in
     motion and so bring along what was commanded in the seconds before (`RUN_UP_S`), in rows with ``run_up`` 1 and without
-    poses. DataError where that makes fewer than two trials.
+    poses. Trials that the log has already are cut each by itself, and the pieces are named by both: 7-0, 7-1; one that remains
+    whole keeps its name. DataError where that makes fewer than two trials, or no more than there were.
     """
     missing = [name for name in ("t_s", *COMMANDS) if name not in table.columns]
     if missing:
         raise DataError(f"To be cut into trials, a log needs {', '.join(missing)}; add entries for them.")
-    if "trial" in table.columns:
-        raise DataError(
-            "The log has a column trial already; leave trials out of the mapping, or rename the column."
-        )
+    if "trial" not in table.columns:
+        t = table["t_s"].to_numpy(dtype=float)
+        return _cut(table if SESSION in table.columns else table.assign(**{SESSION: t - t[0]}), by, seconds)
+    parts = []
+    for name, one in table.groupby("trial", sort=False):
+        pieces = _cut(one.drop(columns="trial").reset_index(drop=True), by, seconds, fewest=1)
+        whole = pieces["trial"].nunique() < 2  # noqa: PLR2004
+        parts.append(pieces.assign(trial=str(name) if whole else f"{name}-" + pieces["trial"].astype(str)))
+    out = pd.concat(parts, ignore_index=True)
+    if out["trial"].nunique() <= len(parts):
+        raise DataError(f"trials: {{{by}: {seconds:g}}} cuts none of the {len(parts)} trials of this log; cut finer.")
+    return out
+
+
+def _cut(table: pd.DataFrame, by: str, seconds: float, fewest: int = 2) -> pd.DataFrame:
+    """A table without trials cut into so many at least."""
     t = table["t_s"].to_numpy(dtype=float)
     if not (np.diff(t) >= 0).all():
         row = int(np.flatnonzero(~(np.diff(t) >= 0))[0]) + 1
@@ -38,10 +52,10 @@ def split(table: pd.DataFrame, by: str, seconds: float) -> pd.DataFrame:
             "starts again with every trial, give the log a column trial (in pandas: (log.t_s.diff() < 0).cumsum())."
         )
     trial = _CUTS[by](table, t, seconds)
-    if trial.max() < 1:
+    if trial.max() + 1 < fewest:
         text = f"trials: {{{by}: {seconds:g}}} cuts this log of {t[-1] - t[0]:.0f} s into fewer than two trials. "
         raise DataError(text + _hint(table, t))
-    out = table.assign(trial=trial, **({} if SESSION in table.columns else {SESSION: t - t[0]}))
+    out = table.assign(trial=trial)
     if by == "lasting_s":
         return _with_run_up(out, t)
     out = out[out["trial"] >= 0]
@@ -105,3 +119,14 @@ def _pieces(table: pd.DataFrame, t: NDArray[np.float64], seconds: float) -> NDAr
 
 _CUTS = {"standing_s": _between_stands, "gap_s": _between_gaps, "lasting_s": _pieces}
 """As `mapping.SPLITS`: (table, times, seconds) -> trial of every row, -1 for rows of none."""
+
+
+def finer(lasted_s: NDArray[np.float64]) -> str:
+    """Advice to cut trials (trials,) that last twice as long as pieces do, or longer, as a sentence behind another; else ""."""
+    pieces = int(np.maximum(lasted_s // PIECE_S, 1).sum())
+    if pieces < 2 * len(lasted_s) or not len(lasted_s):  # noqa: PLR2004
+        return ""
+    return (
+        f" These last {lasted_s.mean():.0f} s on average: cut each into pieces (trials: {{lasting_s: {PIECE_S:g}}} in a mapping "
+        f"of bns import), and the same drives are {pieces} trials."
+    )

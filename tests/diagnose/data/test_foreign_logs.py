@@ -205,7 +205,6 @@ def test_what_does_not_fit_a_log_is_said(bag, tmp_path, change, message):
         ({"trials": {"standing_s": -1}}, "trials is .*write one of"),
         ({"trials": {"standing": 1}}, "trials is .*write one of"),
         ({"hold_commands_s": "yes"}, "hold_commands_s is 'yes'; it must be a number above 0"),
-        ({"columns": {**ROS["columns"], "trial": {"from": "run"}}}, "leave out one of the two"),
         ({"also": {"file": "a.csv"}}, "also is .*must be a list"),
         ({"also": [{"file": "a.csv", "columns": {}}]}, "a.csv needs an entry t_s"),
         ({"also": [{"file": "a.csv", "colums": {}}]}, "write {file: NAME"),

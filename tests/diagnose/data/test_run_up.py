@@ -5,9 +5,12 @@ import pandas as pd
 import pytest
 
 import bns
+from bns.cli.main import main
 from bns.diagnose.data.split_trials import split
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.errors import DataError
+from bns.measurements import COMMANDS, POSE
 from bns.physics.wheels.differential_drive import observe, track
 from tests.diagnose.worlds import NOMINAL, hidden
 
@@ -61,6 +64,40 @@ def test_times_are_those_of_the_piece(pieces, log):
     worst = seen.worst.iloc[0]
     begun = 20.0 * int(worst["trial"])
     assert begun + worst["t_s"] == pytest.approx(310.0, abs=1.0)
+
+
+def test_trials_that_are_there_are_cut_each_by_itself(log):
+    """Two of 65 s, times from the beginning of each, and one of 12 s that remains whole."""
+    first, second, short = (log[(log["t_s"] >= a) & (log["t_s"] < b)] for a, b in ((0.0, 65.0), (100.0, 165.0), (200.0, 212.0)))
+    named = zip("ABC", (first, second, short), strict=True)
+    parts = [one.assign(trial=name, t_s=one["t_s"] - one["t_s"].iloc[0]) for name, one in named]
+    cut = split(pd.concat(parts, ignore_index=True), "lasting_s", 20.0)
+    assert list(cut["trial"].unique()) == ["A-0", "A-1", "A-2", "B-0", "B-1", "B-2", "C"]
+    alone = split(parts[1].drop(columns="trial").reset_index(drop=True), "lasting_s", 20.0)
+    own = cut[cut["trial"].str.startswith("B")].reset_index(drop=True)
+    pd.testing.assert_frame_equal(own[["t_s", *POSE, *COMMANDS, "run_up"]], alone[["t_s", *POSE, *COMMANDS, "run_up"]])
+    assert "session_s" not in cut  # times begin anew with each trial: nobody knows when it was
+    with pytest.raises(DataError, match=r"cuts none of the 1 trials"):
+        split(parts[2], "lasting_s", 20.0)
+
+
+def test_a_mapping_may_cut_trials_that_have_names(log, tmp_path):
+    log[log["t_s"] < 130].assign(trial="A").to_csv(tmp_path / "log.csv", index=False)
+    (tmp_path / "map.yaml").write_text("columns: {trial: {from: trial}}\ntrials: {lasting_s: 20}\n")
+    out = tmp_path / "cut.csv"
+    assert main(["import", str(tmp_path / "log.csv"), "--map", str(tmp_path / "map.yaml"), "-o", str(out)]) == 0
+    assert list(pd.read_csv(out)["trial"].unique()) == [f"A-{k}" for k in range(6)]
+
+
+@pytest.mark.parametrize(("each_s", "pieces"), [(130.0, 18), (41.0, 6), (39.0, 0)])
+def test_few_trials_that_last_long_may_be_cut(log, each_s, pieces):
+    table = pd.concat(
+        [log[log["t_s"] < each_s].assign(trial=k, t_s=lambda one: one["t_s"] + 1e-9) for k in range(3)], ignore_index=True
+    )
+    (note,) = bns.diagnose(table, LIMITED).notes
+    assert note.startswith("3 trials: anything they show could be due to chance.")
+    assert (f"the same drives are {pieces} trials." in note) == bool(pieces)
+    assert ("in a mapping of bns import" in note) == bool(pieces)
 
 
 @pytest.mark.slow
