@@ -12,7 +12,7 @@ from bns.measurements import COMMANDS, POSE, RUN_UP, SESSION
 
 STILL_M_S = DEFAULTS.data.still_m_s
 KEPT_S = DEFAULTS.data.kept_standing_s
-PIECE_S = DEFAULTS.data.guess_cuts[-1]
+_STAND_S, _GAP_S, PIECE_S = DEFAULTS.data.guess_cuts
 RUN_UP_S = DEFAULTS.data.run_up_taken_s
 
 
@@ -34,7 +34,7 @@ def split(table: pd.DataFrame, by: str, seconds: float) -> pd.DataFrame:
     parts = []
     for name, one in table.groupby("trial", sort=False):
         pieces = _cut(one.drop(columns="trial").reset_index(drop=True), by, seconds, fewest=1)
-        whole = pieces["trial"].nunique() < 2  # noqa: PLR2004
+        whole = pieces["trial"].nunique() < 2
         parts.append(pieces.assign(trial=str(name) if whole else f"{name}-" + pieces["trial"].astype(str)))
     out = pd.concat(parts, ignore_index=True)
     if out["trial"].nunique() <= len(parts):
@@ -124,7 +124,7 @@ _CUTS = {"standing_s": _between_stands, "gap_s": _between_gaps, "lasting_s": _pi
 def finer(lasted_s: NDArray[np.float64]) -> str:
     """Advice to cut trials (trials,) that last twice as long as pieces do, or longer, as a sentence behind another; else ""."""
     pieces = int(np.maximum(lasted_s // PIECE_S, 1).sum())
-    if pieces < 2 * len(lasted_s) or not len(lasted_s):  # noqa: PLR2004
+    if pieces < 2 * len(lasted_s) or not len(lasted_s):
         return ""
     return (
         f" These last {lasted_s.mean():.0f} s on average: cut each into pieces (trials: {{lasting_s: {PIECE_S:g}}} in a mapping "
