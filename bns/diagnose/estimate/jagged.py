@@ -29,17 +29,36 @@ _WIDER, _EDGE, _NARROW = DEFAULTS.estimate.jagged_ranges
 
 
 def with_jagged(problem: Problem, fit: Fit) -> Fit:
-    """The fit with its jagged numbers at their best values, and with intervals for them; the same fit where it has none."""
+    """The fit with its jagged numbers at their best values, and with intervals for them; the same fit where it has none.
+
+    A number that no pose depends on where it is has an interval, too, if it may be anything that is allowed: a limit that is not
+    reached may be higher, but not lower.
+    """
     jagged = [number for number in fit.free if number.parameter.jagged]
-    if not jagged or problem.predictor.luck is not None:
+    idle = [j for j, number in enumerate(fit.free) if number.parameter.reached and _idle(fit, j)]
+    if not jagged and not idle or problem.predictor.luck is not None:
         return fit
+    own = {j: _as_good(problem, fit, j) for j in idle}
     spans: dict[int, tuple[float, float]] = {}
     for number in jagged:  # each at its best, given the best values of those before
         j = fit.free.index(number)
         if number.parameter.low < fit.values[j] < number.parameter.high:
             value, spans[j] = _searched(problem, fit, j)
             fit = _at(problem, fit, j, value)
-    return replace(fit, spans={j: _hull(span, fit.interval(j)) for j, span in spans.items()})
+    return replace(fit, spans={**{j: _hull(span, fit.interval(j)) for j, span in spans.items()}, **own})
+
+
+def _idle(fit: Fit, j: int) -> bool:
+    return bool(len(fit.jacobian)) and not fit.jacobian[..., j].any()
+
+
+def _as_good(problem: Problem, fit: Fit, j: int) -> tuple[float, float]:
+    """The interval of a number that does nothing where it is: of all that is allowed, what drawn trials cannot tell from it."""
+    p, value = fit.free[j].parameter, float(fit.values[j])
+    at = np.sort(np.append(np.linspace(p.low, p.high, _POINTS), value))
+    alone = np.eye(len(fit.free))[j]
+    low, high = _drawn(at, np.stack([_lowest(problem, fit, [(one - value) * alone]) for one in at]))
+    return min(low, value), max(high, value)
 
 
 def _hull(one: tuple[float, float], other: tuple[float, float]) -> tuple[float, float]:

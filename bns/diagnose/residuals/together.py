@@ -20,7 +20,7 @@ from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.residuals.words import VELOCITIES, driven, in_words, seconds, variables_of
 from bns.diagnose.settings import DEFAULTS
 from bns.engine.pose_filter import displacements
-from bns.physics.formula import LEFT, RIGHT, SHARE, WHEELS, names_in
+from bns.physics.formula import LEFT, RIGHT, SHARE, WHEELS, names_in, value_of
 from bns.physics.model import Model
 from bns.physics.signals import Body
 from bns.physics.wheels.motion import with_body_effects
@@ -103,15 +103,29 @@ class _Driven:
         self._told = dict(zip(_SPEEDS, (one.reshape(lasted_s.shape)[self._there] for one in told), strict=True))
 
     def cancels(self, term: Formula) -> bool:
-        """Is a good part of the largest contributions of a term, either way, taken back by the other terms?"""
+        """Is a good part of the largest contributions of a term, either way, taken back by the other terms?
+
+        Or are they smaller than what its words say of the speeds that were driven? Behind a term that slows turns down, a surface
+        never sees its own quick turns.
+        """
         without = self._velocities(_body(self._model.without(term.name), self._predictor))
         for velocity in _JUDGED.get(term.on, (term.on,)):
             own, total = self._whole[velocity] - without[velocity], self._change(velocity)
+            if (at_these_speeds := self._by_its_words(term)) is not None:
+                total = np.sign(at_these_speeds) * np.minimum(np.sign(at_these_speeds) * own, np.sign(at_these_speeds) * total)
+                own = at_these_speeds
             sides = [self._largest(sign * own, sign * total) for sign in (1.0, -1.0)]
             most = max(size for size, _ in sides)
             if any(mostly for size, mostly in sides if size > SIDE * most):
                 return True
         return False
+
+    def _by_its_words(self, term: Formula) -> Array | None:
+        """What a term that follows speed and turn adds at the speeds that were driven; None of one that follows anything else."""
+        if term.on not in _SPEEDS or names_in(term.term) - {*term.values, *_SPEEDS, "moving"}:
+            return None
+        out = value_of(term.term, {**term.values, **self._told, "moving": 1.0})
+        return np.broadcast_to(np.asarray(out, dtype=np.float64), self._share.shape)
 
     def together(self, terms: Sequence[Formula]) -> Iterator[str]:
         """What all terms do together, along what these depend on, to the velocities that these change."""

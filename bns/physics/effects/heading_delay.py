@@ -21,14 +21,14 @@ EFFECT = Effect(
     name="heading-delay",
     stage="clock",
     parameters=(
-        Parameter("delay_s", "s", -2.0, 2.0, (-0.5, 0.5), 0.0, "how much later than its position a pose's heading is measured"),
+        Parameter("delay_s", "s", -2.0, 2.0, (-0.5, 0.5), 0.0, "how much older than its position a pose's heading is"),
     ),
     equation="theta'(t) = theta(t - d), x'(t) = x(t), y'(t) = y(t)",
     residuals="In curves the robot seems to move to one side of its heading, by an angle that grows with the turn rate; and it "
     "seems to turn on for a moment after each turn.",
     lookalikes=("side-slip", "clock-offset", "camera-rotation"),
     sentence="the tracker's headings and its positions are not measured at the same time",
-    sized="the tracker's headings are {delay_s:later|earlier} than its positions",
+    sized="the tracker's headings are {delay_s:older|newer} than its positions",
     measurement="turn the robot by hand on a pivot, and compare when the position of a marker off the pivot and the heading stop",
     apply=apply,
     needs="track",

@@ -224,3 +224,19 @@ def test_only_a_gradient_that_presses_a_number_against_its_bound_holds_it_there(
     assert active_mask(there, free, np.array([-outwards])).tolist() == [True]
     assert active_mask(inside, free, np.array([outwards])).tolist() == [True]
     assert active_mask(there, free, np.array([0.0])).tolist() == [True], "nothing presses"
+
+
+def test_a_limit_that_is_not_reached_may_be_higher_but_not_lower():
+    """The right wheel goes no faster than 0.12 m/s; the left one is never told more than 0.16, so its limit is there or higher."""
+    truth = hidden(speed_limit_mismatch={"max_m_s": 0.12, "left_spare": 1.0})
+    predictor = predictor_of(truth, trials=20, speeds=(-0.16, 0.16))
+    effect = listed(NOMINAL, None, predictor.tracks)["speed-limit-mismatch"]
+    problem = problem_for(predictor, truth)
+    fit = with_jagged(problem, problem.fit(NOMINAL.with_active(effect, (0.12, 0.3)), rounds=0))
+    spare = next(j for j, number in enumerate(fit.free) if number.parameter.name == "left_spare")
+    fastest = 0.16  # at 1 - 0.12 / 0.16 the left limit is that
+    low, high = fit.interval(spare)
+    assert (fit.values[spare], high) == (0.3, 1.0)
+    assert 1 - 0.12 / fastest - 0.06 < low < 0.3
+    other = with_jagged(problem, problem.fit(NOMINAL.with_active(effect, (0.2, 0.0)), rounds=0))  # neither is ever reached
+    assert other.interval(spare)[1] == pytest.approx(1.0)

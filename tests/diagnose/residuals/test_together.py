@@ -100,6 +100,13 @@ def test_a_term_is_said_while_a_good_part_of_it_is_left(seen, kept, said):
     assert (words in said_of(terms, seen).sentences) is said
 
 
+@pytest.mark.parametrize(("first", "said"), [(-0.1, True), (-0.6, False)])
+def test_a_term_behind_one_that_slows_turns_is_not_said_of_turns_that_it_never_sees(seen, first, said):
+    """It grows with the fourth power of the turn rate: of what it would take at the commanded one, 66 % is left, or 3 %."""
+    terms = terms_of(("w", "k * w", {"k": first}), ("v", "-k * v * w**4", {"k": 0.01}, "speed and turn"))
+    assert (in_words(terms[1], seen) in said_of(terms, seen).sentences) is said
+
+
 def test_the_smaller_side_of_a_term_counts_unless_it_is_tiny(seen):
     """Slower forwards, faster backwards, where another term takes that back."""
 
