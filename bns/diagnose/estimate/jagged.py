@@ -36,7 +36,7 @@ def with_jagged(problem: Problem, fit: Fit) -> Fit:
     """
     jagged = [number for number in fit.free if number.parameter.jagged]
     idle = [j for j, number in enumerate(fit.free) if number.parameter.reached and _idle(fit, j)]
-    if not jagged and not idle or problem.predictor.luck is not None:
+    if (not jagged and not idle) or problem.predictor.luck is not None:
         return fit
     own = {j: _as_good(problem, fit, j) for j in idle}
     spans: dict[int, tuple[float, float]] = {}

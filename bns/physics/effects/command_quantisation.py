@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Array, Wheels
@@ -38,15 +39,13 @@ def best_steps(wheels: Wheels, known: Callable[[Array, Array], Array]) -> tuple[
 
     The loss has a valley for each number of steps below the fastest speed: all are looked at, as shares of that speed.
     """
-    steady = _steady(wheels)
-    some = np.unique(np.linspace(0, len(steady[0]) - 1, min(len(steady[0]), _MOST)).astype(int))
-    speed, lasted, way = (values[some] for values in steady)
+    speed, lasted, first, way = _some(*_drives(wheels))
     fastest = np.abs(speed).max(initial=0.0)
-    if len(speed) < _FEWEST or fastest == 0.0:
+    if len(first) < _FEWEST or fastest == 0.0:
         return tuple((step, 1.0) for step in ROUND_M_S)
-    told, steps = speed * lasted, fastest / _STEPS_BELOW
+    told, steps = np.add.reduceat(speed * lasted, first), fastest / _STEPS_BELOW
     off, square = way - told, told @ told
-    moved = np.stack([(known(speed, step) - speed) * lasted for step in steps])
+    moved = np.stack([np.add.reduceat((known(speed, step) - speed) * lasted, first) for step in steps])
     moved -= np.outer(moved @ told / square, told)  # a wheel that is faster or slower by a share is fitted, too
     score = np.maximum(moved @ off, 0.0) ** 2 / ((moved**2).sum(axis=1) + _NOTHING_M2)
     padded = np.pad(score, 1)
@@ -54,30 +53,48 @@ def best_steps(wheels: Wheels, known: Callable[[Array, Array], Array]) -> tuple[
     return tuple((float(steps[peak]), 1.0) for peak in peaks[np.argsort(-score[peaks])][:_TRIED])
 
 
-def _steady(wheels: Wheels) -> tuple[Array, Array, Array]:
-    """Of each wheel while commands do not change: speed as told, how long, and the way that it was tracked to roll, (n,) each."""
+def _some(speed: Array, lasted: Array, first: NDArray[np.int64], way: Array) -> tuple[Array, Array, NDArray[np.int64], Array]:
+    """At most `_MOST` of the drives that `_drives` gives, from the first to the last."""
+    some = np.unique(np.linspace(0, len(first) - 1, min(len(first), _MOST)).astype(int))
+    counts = np.diff(np.append(first, len(speed)))
+    inside = np.repeat(np.isin(np.arange(len(first)), some), counts)
+    return speed[inside], lasted[inside], np.cumsum(counts[some]) - counts[some], way[some]
+
+
+def _drives(wheels: Wheels) -> tuple[Array, Array, NDArray[np.int64], Array]:
+    """Of each wheel: speeds as told and how long, (n,); the first of each drive among these, and the way that it was tracked to
+    roll in it, (drives,).
+
+    A drive is one command; where commands change all the time, what comes in `_PIECE_S`: a pose says little of a shorter way.
+    """
     if wheels.conditions.seen is None:
-        return np.zeros(0), np.zeros(0), np.zeros(0)
+        return np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros(0)
     told = np.stack([wheels.left_m_s, wheels.right_m_s])
     x_m, y_m, heading = np.moveaxis(wheels.conditions.seen, -1, 0)
     middle, turned = (heading[:, 1:] + heading[:, :-1]) / 2.0, np.diff(heading, axis=1)
     ahead = np.diff(x_m, axis=1) * np.cos(middle) + np.diff(y_m, axis=1) * np.sin(middle)
     rolled = np.stack([ahead + side * turned * wheels.wheelbase_m / 2.0 for side in (-1.0, 1.0)])
-    same = (told[..., 1:] == told[..., :-1]).all(axis=0) & np.isfinite(rolled).all(axis=0)
-    run = np.cumsum(~same, axis=1) + np.arange(len(same))[:, None] * (same.shape[1] + 1)
     lasted = (wheels.step_s[:, 1:] + wheels.step_s[:, :-1]) / 2.0
-    which, runs = np.unique(run[same], return_inverse=True)
-    totals = [np.bincount(runs, values[same], len(which)) for values in (lasted, *rolled, *(told[..., 1:] * lasted))]
-    long = totals[0] > 0
-    times, ways, speeds = totals[0][long], totals[1:3], totals[3:]
-    way, speed = (np.concatenate([one[long] for one in two]) for two in (ways, speeds))
-    return speed / np.tile(times, 2), np.tile(times, 2), way
+    there = np.isfinite(rolled).all(axis=0) & (lasted > 0.0)
+    same = (told[..., 1:] == told[..., :-1]).all(axis=0) & there
+    own = np.arange(len(same))[:, None] * (same.shape[1] + 1)  # no drive goes on in the next trial
+    if lasted[same].sum() >= _STEADY * lasted[there].sum():
+        there, drive = same, np.cumsum(~same, axis=1) + own
+    else:
+        drive = (np.cumsum(~there, axis=1) + own) * _FAR + (np.cumsum(lasted, axis=1) - lasted) // _PIECE_S
+    speed = (told[..., 1:] + told[..., :-1]) / 2.0
+    _, first, which = np.unique(drive[there], return_index=True, return_inverse=True)
+    ways = np.concatenate([np.bincount(which, one[there]) for one in rolled])
+    first = np.concatenate([first, first + len(which)])
+    return np.concatenate([one[there] for one in speed]), np.tile(lasted[there], 2), first.astype(np.int64), ways
 
 
 _STEPS_BELOW = np.arange(1.2, 60.0, 0.02)
 """How many steps there may be below the fastest speed. Half of one more or less, and fast commands are rounded the other way."""
 _FEWEST, _MOST, _TRIED, _NOTHING_M2 = 40, 600, 4, 1e-12
-"""Fewest steady drives that say something, most that are looked at; steps that begin a fit; and a square of ways that is none."""
+"""Fewest drives that say something, most that are looked at; steps that begin a fit; and a square of ways that is none."""
+_STEADY, _PIECE_S, _FAR = 0.5, 0.5, 1e6
+"""Share of the time for which commands stay as they are, from which on each is a drive, else this long; more than its pieces."""
 ROUND_M_S = (0.005, 0.008, 0.01, 0.016, 0.02, 0.025, 0.03, 0.04, 0.05, 0.08, 0.1, 0.2)
 """Makers choose round numbers."""
 STEP = Parameter(

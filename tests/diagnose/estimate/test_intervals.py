@@ -227,7 +227,7 @@ def test_only_a_gradient_that_presses_a_number_against_its_bound_holds_it_there(
 
 
 def test_a_limit_that_is_not_reached_may_be_higher_but_not_lower():
-    """The right wheel goes no faster than 0.12 m/s; the left one is never told more than 0.16, so its limit is there or higher."""
+    """The right wheel goes no faster than 0.12 m/s; the left one is never told more than 0.16, so that is its limit or more."""
     truth = hidden(speed_limit_mismatch={"max_m_s": 0.12, "left_spare": 1.0})
     predictor = predictor_of(truth, trials=20, speeds=(-0.16, 0.16))
     effect = listed(NOMINAL, None, predictor.tracks)["speed-limit-mismatch"]

@@ -9,7 +9,7 @@ from bns.diagnose.diagnosis import diagnose
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_extended, fit_with, listed
 from bns.diagnose.predict.wheels import WheelPredictor
-from tests.diagnose.worlds import NOMINAL, hidden, measured
+from tests.diagnose.worlds import BASE_M, FRAME_S, NOMINAL, hidden, measured
 
 
 def driven(trials=20, **effects):
@@ -63,6 +63,41 @@ def test_a_step_is_found_that_is_no_round_number(name, step_m_s):
     problem = problem_for(predictor, NOMINAL)
     found = fit_with(problem, problem.fit(NOMINAL), listed(NOMINAL, None, predictor.tracks)[name])
     assert found.values == pytest.approx([step_m_s, 1.0], rel=0.05)
+
+
+def by_joystick(step_m_s, cut, trials=20, frames=240, gap_at=()):
+    """By this test's own integrator: commands that change with every frame, rounded by `cut` (np.trunc, np.rint)."""
+    rng, rows, within = np.random.default_rng(7), [], 10
+    for trial in range(trials):
+        time = np.arange(frames) * FRAME_S
+        waves = (rng.uniform(low, high, (2, 1)) for low, high in 2 * [(0.03, 0.09), (0.5, 3.0), (0.0, 6.0)])
+        told = sum(next(waves) * np.sin(next(waves) * time + next(waves)) for _ in range(2))
+        left, right = np.repeat(step_m_s * cut(told / step_m_s), within, axis=1)
+        dt = FRAME_S / within
+        heading = np.append(0.0, np.cumsum((right - left) / BASE_M * dt)[:-1])
+        x_m, y_m = (np.append(0.0, np.cumsum((left + right) / 2 * f(heading) * dt)[:-1]) for f in (np.cos, np.sin))
+        seen = np.column_stack([x_m, y_m, heading])[::within] + rng.normal(size=(frames, 3)) * [1e-3, 1e-3, 4e-3]
+        columns = {"trial": trial, "t_s": time, "left_m_s": told[0], "right_m_s": told[1]}
+        one = pd.DataFrame(columns | dict(zip(("x_m", "y_m", "heading_rad"), seen.T, strict=True)))
+        one.loc[[*gap_at], ["x_m", "y_m", "heading_rad"]] = np.nan
+        rows.append(one)
+    return WheelPredictor(tracks_of(pd.concat(rows, ignore_index=True)))
+
+
+@pytest.mark.parametrize(("name", "cut"), [("command-truncation", np.trunc), ("command-quantisation", np.rint)])
+@pytest.mark.parametrize("gap_at", [(), range(100, 120)])
+def test_a_step_is_found_in_commands_that_change_all_the_time(name, cut, gap_at):
+    """No command is driven for long enough to say anything by itself."""
+    predictor = by_joystick(0.0317, cut, gap_at=gap_at)
+    problem = problem_for(predictor, NOMINAL)
+    found = fit_with(problem, problem.fit(NOMINAL), listed(NOMINAL, None, predictor.tracks)[name])
+    assert found.values == pytest.approx([0.0317, 1.0], rel=0.05)
+
+
+@pytest.mark.slow
+def test_commands_of_a_joystick_that_are_cut_off_are_no_friction_and_steps():
+    found = diagnose(by_joystick(0.03, np.trunc), NOMINAL)
+    assert (found.verdict, found.effects) == ("effects", ("command-truncation",))
 
 
 def test_a_wheel_that_starts_late_is_found_from_one_that_stops_at_the_same_command():
