@@ -86,6 +86,7 @@ def notes_on(
         )
     yield from _on_moved(found)
     yield from _on_kept(found.kept_for)
+    yield from _on_heading(found.seen_in_heading)
     yield from _on_effects(selection, tracks, found.imitating)
     yield from single_wheel(found.terms[0].fit if _described(found) else selection.fit)  # the numbers that are shown
     yield from _on_the_cone(selection.fit.model)
@@ -269,6 +270,15 @@ def _on_kept(kept_for: Mapping[str, Sequence[Shift]]) -> Iterator[str]:
         yield (
             f"{name} is certain, but without it no error on held-out trials is higher by {LEAST_FALL:.0%} or more. It is named "
             f"because without it {said}: measure one of these by itself to decide."
+        )
+
+
+def _on_heading(seen: Mapping[str, tuple[str, float, float]]) -> Iterator[str]:
+    """Effects for which the table of errors, which is of positions, has no reason."""
+    for name, (horizon, without, having) in seen.items():
+        yield (
+            f"{name} lowers the error of the heading (over {IN_WORDS[horizon]} from {1e3 * without:.2g} to {1e3 * having:.2g} "
+            f"mrad), and no error of position by {LEAST_FALL:.0%} or more."
         )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,14 @@ from bns.diagnose.residuals.floor_field import imitating_floor
 from bns.diagnose.residuals.symbolic import Formula, best_formula
 from bns.diagnose.residuals.unexplained import NOTHING, Unexplained, unexplained, without_moments_explained
 from bns.diagnose.select.known_effects import known_effects
-from bns.diagnose.select.negligible import LEAST_FALL, Shift, below_noise, fall_matters, negligible_and_errors
+from bns.diagnose.select.negligible import (
+    LEAST_FALL,
+    Shift,
+    below_noise,
+    fall_matters,
+    negligible_and_errors,
+    seen_in_heading,
+)
 from bns.diagnose.select.result import SelectionResult, certainly_lower
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import numbers_of
@@ -70,6 +77,8 @@ class Outcome:
     errors_with_terms: PairedErrors | None
     formula: Formula | None
     """The first term; without terms, a formula fitted to the variable along which most is left, where it earns something."""
+    seen_in_heading: dict[str, tuple[str, float, float]] = field(default_factory=dict)
+    """Effects that lower no error of position: at which horizon that of the heading most, without and with them (rad)."""
 
     @property
     def fewer(self) -> bool:
@@ -131,7 +140,7 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
     if unseen or slight:
         stands = replace(stands, rest=NOTHING)
     whole = stands.selection
-    tiny, kept_for = ((), {}) if terms else _negligible(whole)
+    tiny, kept_for, in_heading = ((), {}, {}) if terms else _negligible(whole)
     selection = refitted(whole.lacking(tiny), predictor, given) if tiny else whole
     numbers = numbers_of(whole.fit) if tiny else {}
     # too few trials may show a place for its curve to be certain; it is the best guess where moments stand out
@@ -152,6 +161,7 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
         unseen,
         with_terms,
         formula,
+        in_heading,
     )
 
 
@@ -221,12 +231,17 @@ def _relative(errors: PairedErrors) -> float:
     return sum(ratios) / max(len(ratios), 1)
 
 
-def _negligible(selection: SelectionResult) -> tuple[tuple[str, ...], dict[str, tuple[Shift, ...]]]:
-    """As `negligible`, and what the others that no error shows are kept for; not asked where trials have clocks of their own."""
+def _negligible(
+    selection: SelectionResult,
+) -> tuple[tuple[str, ...], dict[str, tuple[Shift, ...]], dict[str, tuple[str, float, float]]]:
+    """As `negligible`, what the others that no error shows are kept for, and those that only the heading's error shows.
+
+    Not asked where trials have clocks of their own.
+    """
     if selection.fit.model.per_trial_effect is not None:
-        return (), {}
-    tiny, _, kept_for = negligible_and_errors(selection)
-    return tiny, kept_for
+        return (), {}, {}
+    tiny, errors, kept_for = negligible_and_errors(selection)
+    return tiny, kept_for, seen_in_heading(errors, [name for name in selection.accepted if name not in {*tiny, *kept_for}])
 
 
 def _beside_the_floor(

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.residuals.grammar import SURFACE
 from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.residuals.words import VELOCITIES, driven, in_words, seconds, variables_of
 from bns.diagnose.settings import DEFAULTS
@@ -121,8 +122,8 @@ class _Driven:
         return False
 
     def _by_its_words(self, term: Formula) -> Array | None:
-        """What a term that follows speed and turn adds at the speeds that were driven; None of one that follows anything else."""
-        if term.on not in _SPEEDS or names_in(term.term) - {*term.values, *_SPEEDS, "moving"}:
+        """What a free surface over speed and turn adds at the speeds that were driven, as its words say; None of other terms."""
+        if term.signal != SURFACE or term.on not in _SPEEDS:
             return None
         out = value_of(term.term, {**term.values, **self._told, "moving": 1.0})
         return np.broadcast_to(np.asarray(out, dtype=np.float64), self._share.shape)

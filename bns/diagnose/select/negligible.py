@@ -161,13 +161,33 @@ def _errors_of(problem: Problem, fits: Mapping[str, Fit]) -> PairedErrors:
     return paired_errors(problem.predictor, steps)
 
 
-def _largest_fall(errors: PairedErrors, before: str, after: str) -> float:
-    """By which fraction the error falls from one model to another beyond luck, at the horizon and in the measure of most."""
+def seen_in_heading(errors: PairedErrors | None, names: Collection[str]) -> dict[str, tuple[str, float, float]]:
+    """Of effects that are not negligible, those that lower no error of position by `least_fall`: at which horizon they lower that
+    of the heading most, and that error without and with them (rad). ``errors``: of `negligible_and_errors`."""
+    found = {}
+    for name in names if errors is not None else ():
+        assert errors is not None
+        if _largest_fall(errors, name, _ALL, heading=False) < LEAST_FALL <= _largest_fall(errors, name, _ALL):
+            at = {h: (errors.of(name)[h].heading_rad, errors.of(_ALL)[h].heading_rad) for h in errors.horizons}
+            most = max(at, key=lambda h: _falls_by(*at[h], errors.horizons[h].windows))
+            found[name] = most, *at[most]
+    return found
+
+
+def _largest_fall(errors: PairedErrors, before: str, after: str, heading: bool = True) -> float:
+    """By which fraction the error falls from one model to another beyond luck, at the horizon and in the measure of most.
+
+    ``heading``: is that of the heading one of these.
+    """
     models = errors.of(before), errors.of(after)
     falls = []
     for horizon, at in errors.horizons.items():
         one, other = (named[horizon] for named in models)
-        pairs = [(one.rms_m, other.rms_m), (one.heading_rad, other.heading_rad)]
+        pairs = [(one.rms_m, other.rms_m)] + ([(one.heading_rad, other.heading_rad)] if heading else [])
         pairs += [(one.median_m, other.median_m)] if at.windows >= MEDIAN_OF else []
-        falls += [1 - b / a - LUCK / np.sqrt(at.windows) for a, b in pairs if a > 0]
+        falls += [_falls_by(a, b, at.windows) for a, b in pairs if a > 0]
     return max(falls, default=0.0)
+
+
+def _falls_by(before: float, after: float, windows: int) -> float:
+    return float(1.0 - after / before - LUCK / np.sqrt(windows))

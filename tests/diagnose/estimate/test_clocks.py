@@ -74,7 +74,7 @@ def test_beside_something_left_clocks_stand_only_if_the_error_is_lower_at_every_
         rest = SimpleNamespace(any=left)
         given = {"selection": selection, "errors": errors, "rest": rest, "dependence": []}
         none = dict.fromkeys(("terms", "slight", "withdrawn", "imitating"), ())
-        none |= {name: {} for name in ("negligible", "beside_negligible", "kept_for")}
+        none |= {name: {} for name in ("negligible", "beside_negligible", "kept_for", "seen_in_heading")}
         return Outcome(**{**unknown, **given, **none})
 
     monkeypatch.setattr(diagnosis, "StepwiseSelection", Search)

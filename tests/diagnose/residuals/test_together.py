@@ -16,6 +16,7 @@ from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report.page import _of_all_terms
 from bns.diagnose.residuals import together
 from bns.diagnose.residuals.established import Established
+from bns.diagnose.residuals.grammar import RESPONSE_OF, SURFACE
 from bns.diagnose.residuals.symbolic import fitted
 from bns.diagnose.residuals.together import formula_in_words, said_of
 from bns.diagnose.residuals.words import in_words
@@ -103,8 +104,15 @@ def test_a_term_is_said_while_a_good_part_of_it_is_left(seen, kept, said):
 @pytest.mark.parametrize(("first", "said"), [(-0.1, True), (-0.6, False)])
 def test_a_term_behind_one_that_slows_turns_is_not_said_of_turns_that_it_never_sees(seen, first, said):
     """It grows with the fourth power of the turn rate: of what it would take at the commanded one, 66 % is left, or 3 %."""
-    terms = terms_of(("w", "k * w", {"k": first}), ("v", "-k * v * w**4", {"k": 0.01}, "speed and turn"))
+    terms = terms_of(("w", "k * w", {"k": first}), ("v", "-k * v * w**4", {"k": 0.01}, SURFACE))
     assert (in_words(terms[1], seen) in said_of(terms, seen).sentences) is said
+
+
+def test_a_surface_beside_an_answer_to_past_commands_can_be_said(seen):
+    """The latter's formula has functions of its own."""
+    late = ("w", "k * (w - ago(0, 0.1))", {"k": -0.05}, RESPONSE_OF["w"])
+    terms = terms_of(("v", "k * v * moving", {"k": -0.1}, SURFACE), late)
+    assert in_words(terms[0], seen) in said_of(terms, seen).sentences
 
 
 def test_the_smaller_side_of_a_term_counts_unless_it_is_tiny(seen):

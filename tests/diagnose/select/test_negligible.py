@@ -31,6 +31,7 @@ from bns.diagnose.select.negligible import (
     fall_matters,
     negligible,
     negligible_and_errors,
+    seen_in_heading,
     shifted,
 )
 from bns.diagnose.select.result import SelectionResult, certainly_lower
@@ -311,6 +312,22 @@ def test_an_error_falls_by_the_share_beyond_luck_of_the_measure_that_falls_most(
     assert _largest_fall(errors(many, **models), "before", "after") == pytest.approx(0.75 - LUCK / many**0.5)
     nothing = {"before": (0.0, 0.0, 0.0), "after": (1.0, 1.0, 1.0)}
     assert _largest_fall(errors(many, **nothing), "before", "after") == 0.0
+
+
+@pytest.mark.parametrize(
+    ("without", "seen"),
+    [((0.1, 0.25, 0.1), True), ((0.2, 0.25, 0.1), False), ((0.1, 0.25, 0.2), False), ((0.1, 0.1, 0.1), False)],
+)
+def test_an_effect_that_only_the_error_of_the_heading_shows_is_said(without, seen):
+    """Errors of position, of the heading, and the median; the horizon has a name of the tool."""
+    judged = errors(MEDIAN_OF, one=without, all=(0.1, 0.1, 0.1))
+    (horizon,) = judged.horizons
+    found = seen_in_heading(judged, ["one"])
+    assert found == ({"one": (horizon, 0.25, 0.1)} if seen else {})
+    assert seen_in_heading(None, ["one"]) == {}
+    words = list(caveats._on_heading({name: ("trial", *two) for name, (_, *two) in found.items()}))
+    assert words == ["one lowers the error of the heading (over the whole trial from 2.5e+02 to 1e+02 mrad), and no error of "
+                     "position by 2% or more."] * seen  # fmt: skip
 
 
 @pytest.mark.parametrize(
