@@ -34,9 +34,10 @@ _PLACES = {"simulated": "networks", "quiet": "world without noise", "noisy": "wo
 def evaluations(store: Results, sweep: str = SWEEP) -> pd.DataFrame:
     """A row an evaluation of the seeds that all approaches have: task, approach, seed, evaluation, success (within 7 cm)."""
     rows = store.query(f"""
-        SELECT task, approach, seed, evaluation, evals.success::INT AS success, cpu_s, robot_s
+        SELECT task, approach, generations_per_evaluation AS generations, seed, evaluation, evals.success::INT AS success,
+               cpu_s, robot_s
         FROM evals JOIN (SELECT run_id, sweep, cpu_s FROM runs WHERE status = 'ok' AND sweep = '{sweep}') USING (run_id, sweep)
-        ORDER BY task, approach, seed, evaluation""")
+        ORDER BY task, approach, generations, seed, evaluation""")
     have = rows.groupby(["task", "seed"]).approach.transform("nunique")
     return rows[have == rows.approach.nunique()]
 
@@ -46,29 +47,29 @@ def compared(rows: pd.DataFrame, approaches: Sequence[str] = APPROACHES, base_na
     last evaluations with bootstrap intervals over seeds, and the paired change of the latter from the base."""
     table = []
     for task in ceiling.TASKS:
-        base = _of_seeds(rows[(rows.task == task) & (rows.approach == base_name)])
+        base = of_seeds(rows[(rows.task == task) & (rows.approach == base_name)])
         for approach in (name for name in approaches if name in set(rows.approach)):
             own = rows[(rows.task == task) & (rows.approach == approach)]
-            shares = _of_seeds(own)
+            shares = of_seeds(own)
             at_end = own[own.evaluation == own.evaluation.max()].success
             low, high = wilson(at_end.sum(), len(at_end))
             row = {"task": task, "approach": approach, "runs": len(shares), "end": 100 * at_end.mean()}
             row |= {"end_low": 100 * float(low), "end_high": 100 * float(high)}
             row |= {"cpu_s": own.groupby("seed").cpu_s.first().median()}
             for name, values in (("early", shares.early), ("last", shares["last"]), ("change", (shares - base)["last"])):
-                row |= _interval(name, values.to_numpy())
+                row |= interval(name, values.to_numpy())
             table.append(row)
     return pd.DataFrame(table)
 
 
-def _of_seeds(own: pd.DataFrame) -> pd.DataFrame:
+def of_seeds(own: pd.DataFrame) -> pd.DataFrame:
     """Shares of success of each seed, ``early`` and ``last``."""
     last = own.evaluation.max()
     parts = {"early": own[own.evaluation <= EARLY], "last": own[own.evaluation > last - LAST]}
     return pd.DataFrame({name: part.groupby("seed").success.mean() for name, part in parts.items()})
 
 
-def _interval(name: str, values: np.ndarray) -> dict[str, float]:
+def interval(name: str, values: np.ndarray) -> dict[str, float]:
     """Mean in per cent and its interval over seeds."""
     low = high = float("nan")
     if len(values) >= FEWEST_SEEDS:
@@ -88,16 +89,16 @@ def in_words(table: pd.DataFrame) -> list[str]:
     return lines
 
 
-def late_in_words(rows: pd.DataFrame, drives: pd.DataFrame) -> list[str]:
+def late_in_words(rows: pd.DataFrame, drives: pd.DataFrame, shown: str = "`{}`") -> list[str]:
     """Rows of the table of `LATE`: with the success of final controllers in the world, ``drives`` as `limits` takes them, and
-    medians of a run's robot minutes and CPU seconds."""
+    medians of a run's robot minutes and CPU seconds; approaches as ``shown``."""
     found, lines = limits(drives).set_index(["task", "approach"]), []
     names = sorted(set(rows.approach))
     for row in compared(rows, names, names[0]).itertuples():
         world = found.loc[(row.task, row.approach)]
         own = rows[(rows.task == row.task) & (rows.approach == row.approach) & (rows.evaluation == rows.evaluation.max())]
         lines.append(
-            f"| {row.task} | `{row.approach}` | {row.end:.0f} % ({row.end_low:.0f}–{row.end_high:.0f}) "
+            f"| {row.task} | {shown.format(row.approach)} | {row.end:.0f} % ({row.end_low:.0f}–{row.end_high:.0f}) "
             f"| {row.last:.0f} % ({row.last_low:.0f}–{row.last_high:.0f}) "
             f"| {world.noisy:.0f} % ({world.noisy_low:.0f}–{world.noisy_high:.0f}) | {row.early:.0f} % "
             f"| {own.robot_s.median() / 60:.0f} | {row.cpu_s:.1f} |"
@@ -112,7 +113,7 @@ def limits(drives: pd.DataFrame) -> pd.DataFrame:
     for (task, approach), own in drives.groupby(["task", "approach"]):
         row: dict[str, object] = {"task": task, "approach": approach, "runs": len(own)}
         for place in _PLACES:
-            row |= _interval(place, own[place].to_numpy(float))
+            row |= interval(place, own[place].to_numpy(float))
         rows.append(row)
     return pd.DataFrame(rows)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis import ceiling, limits
+from analysis import ceiling, ensembles, limits
 from bns.engine.philox import Key, Purpose
 from bns.robots.base import RandomStream
 from bns.tasks import load_task
@@ -98,3 +98,28 @@ def test_what_limits_is_by_approach_and_the_picture_has_a_column_for_each_task()
     figure = limits.drawn(rows_of([[0] * 6, [1] * 6, [2] * 6, [3] * 6]), found, possible)
     assert len(figure.axes) == 6
     assert [line.get_ydata()[0] for ax in figure.axes[3:] for line in ax.lines if len(line.get_ydata()) == 2] == [99, 98, 95]
+
+
+def test_what_networks_and_generations_gain_is_paired_by_seed_and_the_mean_of_the_tasks():
+    gained = {"1 | 20": 0, "3 | 20": 1, "1 | 60": 2, "3 | 60": 4}
+    rows, driven = [], []
+    for number, task in enumerate(ceiling.TASKS):
+        for cell, more in gained.items():
+            for seed in range(6):
+                # A seed's luck is in all of its cells: pairs leave it out.
+                share = (seed % 2 + more * (number > 0)) / 5
+                driven.append({"task": task, "approach": cell, "seed": seed, "noisy": share})
+                for evaluation in range(1, 11):
+                    success = int(evaluation > 10 - round(5 * share))
+                    rows.append({"task": task, "approach": cell, "seed": seed, "evaluation": evaluation, "success": success})
+    table = ensembles.changes(pd.DataFrame(rows), pd.DataFrame(driven))
+    said = ensembles.changes_in_words(table, "last")
+    table = table.set_index(["measure", "what", "of"]).sort_index()
+    for measure in ("last", "world"):
+        both = table.loc[(measure, "both")]
+        assert both.loc["circle", "change"] == pytest.approx(0)
+        assert both.loc["complex", "change"] == pytest.approx(80)
+        assert both.loc["all three", ["change", "change_low", "change_high"]].tolist() == pytest.approx([160 / 3] * 3)
+        assert table.loc[(measure, "60 generations, with three networks", "infinity"), "change"] == pytest.approx(60)
+    assert said[2] == "| both | 0 (0 to 0) | +80 (+80 to +80) | +80 (+80 to +80) | +53 (+53 to +53) |"
+    assert len(said) == 5

@@ -5,7 +5,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from analysis import approach_pairs, approach_summary, ceiling, limits
+from analysis import approach_pairs, approach_summary, ceiling, ensembles, limits
 from analysis.results import Results
 
 ROOT = Path(__file__).parents[2]
@@ -65,6 +65,18 @@ def test_what_is_said_of_missed_goals_that_count_more_is_what_its_archive_gives(
     said = limits.late_in_words(rows, pd.read_csv(limits.PUBLISHED / "noise-late-drives.csv"))
     assert len(said) == 6
     assert "\n".join(said) in TEXT
+
+
+def test_what_is_said_of_networks_and_generations_is_what_the_archives_give():
+    published = limits.PUBLISHED
+    rows = ensembles.evaluations(published / "noise-ensemble.parquet")
+    driven = ensembles.drives(published / "noise-ensemble-drives.csv")
+    said = limits.late_in_words(rows, driven, "{}")
+    assert len(said) == 3 * len(ensembles.CELLS)
+    assert "\n".join(said) in TEXT
+    table = ensembles.changes(rows, driven)
+    for measure in ("last", "world"):
+        assert "\n".join(ensembles.changes_in_words(table, measure)) in TEXT
 
 
 def test_what_is_said_of_noise_is_what_its_archive_and_its_drives_give():
