@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
-from bns.measurements import COMMANDS, POSE, RUN_UP, SESSION
+from bns.measurements import BEFORE, COMMANDS, POSE, RUN_UP, SESSION
 
 STILL_M_S = DEFAULTS.data.still_m_s
 KEPT_S = DEFAULTS.data.kept_standing_s
@@ -31,15 +31,25 @@ def split(table: pd.DataFrame, by: str, seconds: float) -> pd.DataFrame:
     if "trial" not in table.columns:
         t = table["t_s"].to_numpy(dtype=float)
         return _cut(table if SESSION in table.columns else table.assign(**{SESSION: t - t[0]}), by, seconds)
-    parts = []
+    if begun := [name for name in (RUN_UP, *BEFORE) if name in table.columns]:
+        raise DataError(
+            f"{', '.join(begun)}: these columns say how the trials of this log began, not how pieces of them do. Cut the log "
+            "that it was made from, or leave the columns out."
+        )
+    parts, cuts = [table[table["trial"].isna()]], 0  # the checks say that they belong to no trial
     for name, one in table.groupby("trial", sort=False):
-        pieces = _cut(one.drop(columns="trial").reset_index(drop=True), by, seconds, fewest=1)
-        whole = pieces["trial"].nunique() < 2
-        parts.append(pieces.assign(trial=str(name) if whole else f"{name}-" + pieces["trial"].astype(str)))
-    out = pd.concat(parts, ignore_index=True)
-    if out["trial"].nunique() <= len(parts):
-        raise DataError(f"trials: {{{by}: {seconds:g}}} cuts none of the {len(parts)} trials of this log; cut finer.")
-    return out
+        called = f"{name:g}" if isinstance(name, float) else str(name)  # as numbers are where a row has none
+        try:
+            pieces = _cut(one.drop(columns="trial").reset_index(drop=True), by, seconds, fewest=0)
+        except DataError as error:
+            raise DataError(f"Trial {called}: {error}") from error
+        cut = pieces["trial"].nunique() > 1
+        parts.append(pieces.assign(trial=f"{called}-" + pieces["trial"].astype(str) if cut else called))
+        cuts += cut
+    if not cuts:
+        trials = table["trial"].nunique()
+        raise DataError(f"trials: {{{by}: {seconds:g}}} cuts none of the {trials} trials of this log; cut finer.")
+    return pd.concat([part for part in parts if len(part)], ignore_index=True)
 
 
 def _cut(table: pd.DataFrame, by: str, seconds: float, fewest: int = 2) -> pd.DataFrame:

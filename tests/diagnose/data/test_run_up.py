@@ -81,6 +81,21 @@ def test_trials_that_are_there_are_cut_each_by_itself(log):
         split(parts[2], "lasting_s", 20.0)
 
 
+def test_what_trials_cannot_be_cut_is_said_and_nothing_is_lost(log):
+    """Rows of no trial stay, for the checks to speak of; one in which the robot stands is left out, as is standing elsewhere."""
+    two = pd.concat([log[log["t_s"] < 50].assign(trial=name) for name in (1.0, 2.0)], ignore_index=True)
+    for column in ("run_up", "before_left_m_s"):
+        with pytest.raises(DataError, match=rf"^{column}: these columns say how the trials"):
+            split(two.assign(**{column: 0.0}), "lasting_s", 20.0)
+    back = two.assign(t_s=two["t_s"].where(two.index != two.index[-5], 0.0))
+    with pytest.raises(DataError, match=r"Trial 2: Row \d+: t_s runs backwards"):
+        split(back, "lasting_s", 20.0)
+    nowhere = two.assign(trial=two["trial"].where(two.index > 3))
+    assert split(nowhere, "lasting_s", 20.0)["trial"].isna().sum() == 4
+    stands = two.assign(**{name: two[name].where((two["trial"] == 1.0) & ~two["t_s"].between(20, 25), 0.0) for name in COMMANDS})
+    assert list(split(stands, "standing_s", 2.0)["trial"].unique()) == ["1-0", "1-1"]
+
+
 def test_a_mapping_may_cut_trials_that_have_names(log, tmp_path):
     log[log["t_s"] < 130].assign(trial="A").to_csv(tmp_path / "log.csv", index=False)
     (tmp_path / "map.yaml").write_text("columns: {trial: {from: trial}}\ntrials: {lasting_s: 20}\n")
