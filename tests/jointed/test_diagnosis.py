@@ -174,10 +174,11 @@ def test_the_noise_of_a_body_is_said_to_come_from_distances():
 @pytest.mark.parametrize("clocks", [False, True])
 def test_effects_may_be_negligible_where_trials_have_no_clocks_of_their_own(monkeypatch, clocks):
     found = ("floor-slope", "tether-pull"), {"drag": ()}
-    monkeypatch.setattr(outcome, "negligible_and_errors", lambda selection: (found[0], None, found[1]))
+    monkeypatch.setattr(outcome, "negligible_and_errors", lambda selection: (found[0], "errors", found[1]))
+    monkeypatch.setattr(outcome, "seen_in_heading", lambda errors, names: {name: errors for name in names})
     model = SimpleNamespace(per_trial_effect="clock-offset" if clocks else None)
-    selection = SimpleNamespace(fit=SimpleNamespace(model=model))
-    assert outcome._negligible(selection) == (((), {}) if clocks else found)
+    selection = SimpleNamespace(fit=SimpleNamespace(model=model), accepted=("floor-slope", "tether-pull", "drag", "weak-joint"))
+    assert outcome._negligible(selection) == (((), {}, {}) if clocks else (*found, {"weak-joint": "errors"}))
 
 
 @pytest.fixture(scope="module")
