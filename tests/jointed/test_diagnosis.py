@@ -175,7 +175,7 @@ def test_the_noise_of_a_body_is_said_to_come_from_distances():
 def test_effects_may_be_negligible_where_trials_have_no_clocks_of_their_own(monkeypatch, clocks):
     found = ("floor-slope", "tether-pull"), {"drag": ()}
     monkeypatch.setattr(outcome, "negligible_and_errors", lambda selection: (found[0], "errors", found[1]))
-    monkeypatch.setattr(outcome, "seen_in_heading", lambda errors, names: {name: errors for name in names})
+    monkeypatch.setattr(outcome, "seen_in_heading", lambda errors, names: dict.fromkeys(names, errors))
     model = SimpleNamespace(per_trial_effect="clock-offset" if clocks else None)
     selection = SimpleNamespace(fit=SimpleNamespace(model=model), accepted=("floor-slope", "tether-pull", "drag", "weak-joint"))
     assert outcome._negligible(selection) == (((), {}, {}) if clocks else (*found, {"weak-joint": "errors"}))
