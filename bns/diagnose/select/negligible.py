@@ -168,7 +168,8 @@ def seen_in_heading(errors: PairedErrors | None, names: Collection[str]) -> dict
     for name in names if errors is not None else ():
         assert errors is not None
         if _largest_fall(errors, name, _ALL, heading=False) < LEAST_FALL <= _largest_fall(errors, name, _ALL):
-            at = {h: (errors.of(name)[h].heading_rad, errors.of(_ALL)[h].heading_rad) for h in errors.horizons}
+            without = {h: one.heading_rad for h, one in errors.of(name).items() if one.heading_rad > 0.0}
+            at = {h: (rad, errors.of(_ALL)[h].heading_rad) for h, rad in without.items()}
             most = max(at, key=lambda h: _falls_by(*at[h], errors.horizons[h].windows))
             found[name] = most, *at[most]
     return found

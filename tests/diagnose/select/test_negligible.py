@@ -325,6 +325,9 @@ def test_an_effect_that_only_the_error_of_the_heading_shows_is_said(without, see
     found = seen_in_heading(judged, ["one"])
     assert found == ({"one": (horizon, 0.25, 0.1)} if seen else {})
     assert seen_in_heading(None, ["one"]) == {}
+    exact = {name: {**judged.of(name), 2.0: SimpleNamespace(rms_m=0.0, heading_rad=0.0, median_m=0.0)} for name in ("one", "all")}
+    two = SimpleNamespace(of=exact.get, horizons=dict.fromkeys((horizon, 2.0), judged.horizons[horizon]))
+    assert seen_in_heading(two, ["one"]) == found  # no heading is off where no pose is
     words = list(caveats._on_heading({name: ("trial", *two) for name, (_, *two) in found.items()}))
     assert words == ["one lowers the error of the heading (over the whole trial from 2.5e+02 to 1e+02 mrad), and no error of "
                      "position by 2% or more."] * seen  # fmt: skip
