@@ -1,5 +1,7 @@
 """Where the moments that stand out begin: a narrow range of one coordinate, or nothing."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,8 +11,17 @@ from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.residuals.outliers import judged_windows
-from bns.diagnose.residuals.shared_place import _HEADING, _TIME, _X, SharedPlace, _largest_gap, _narrowest, shared_place
+from bns.diagnose.residuals.outliers import JudgedWindows, judged_windows
+from bns.diagnose.residuals.shared_place import (
+    _HEADING,
+    _TIME,
+    _X,
+    FEWEST,
+    SharedPlace,
+    _largest_gap,
+    _narrowest,
+    shared_place,
+)
 from bns.diagnose.residuals.unexplained import unexplained
 from tests.diagnose.worlds import BASE_M, FRAME_S, NOMINAL
 
@@ -70,8 +81,20 @@ def test_moments_at_random_share_nothing():
     assert found is None
 
 
-def test_few_moments_could_share_one_by_chance():
-    assert left_in(lambda pose, _, __: 0.05 < pose[0] < 0.12, trials=5)[2] is None
+@pytest.mark.parametrize(("moments", "found"), [(FEWEST - 1, False), (FEWEST, True)])
+def test_few_moments_could_share_one_by_chance(moments, found):
+    """A trial each, of 100 windows along x; the one near 0.5 m stands out, in all that have one."""
+    windows = np.arange(100 * moments)
+    x = np.tile(np.linspace(0.0, 1.0, 100), moments)
+    rng = np.random.default_rng(0)
+    pose = np.column_stack([x, rng.uniform(size=len(x)), rng.uniform(-3, 3, len(x))])
+    tracks = SimpleNamespace(trial=windows // 100, pose=pose, own_s=rng.uniform(0, 10, len(x)), relative=False)
+    tracks.trial = np.append(tracks.trial, moments - 1)  # windows begin at the frame after a pose
+    stands_out = np.isin(windows % 100, [50])
+    judged = JudgedWindows(windows + 1, np.where(stands_out, 9.0, 1.0), stands_out)
+    place = shared_place(SimpleNamespace(predictor=SimpleNamespace(tracks=tracks)), judged)
+    assert (place is not None) is found
+    assert place is None or (place.inside, place.moments, place.usual) == (moments, moments, pytest.approx(0.01, rel=1e-3))
 
 
 @pytest.mark.parametrize(
