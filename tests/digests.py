@@ -25,6 +25,8 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
+from threadpoolctl import threadpool_info
+
 from tests.digests_kept import FULL, QUICK, Columns, Items, kept, skipped
 
 LIBRARIES = ("numpy", "numba", "scipy", "torch", "pandas", "duckdb")
@@ -69,13 +71,19 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def machine() -> dict[str, str]:
-    """What last bits depend on: the processor, and the libraries that compute."""
+    """What last bits depend on: the processor, the libraries that compute, and the kernels that linear algebra takes.
+
+    The last may be chosen by a variable (OPENBLAS_CORETYPE): on one machine, Haswell's and the processor's own gave numbers of an
+    effect that a log hardly determines which differed by 2e-9.
+    """
     cpu = Path("/proc/cpuinfo")
     lines = cpu.read_text().splitlines() if cpu.is_file() else []
     told = sorted({line for line in lines if line.startswith(("model", "cpu family", "flags", "Features"))})
     kind = hashlib.sha256("\n".join(told).encode()).hexdigest()[:16]
     processor = f"{platform.system()} {platform.machine()} {platform.processor()} {kind}"
-    return {"processor": processor, "python": platform.python_version()} | {name: version(name) for name in LIBRARIES}
+    kernels = ", ".join(sorted({one.get("architecture", "") for one in threadpool_info() if one["user_api"] == "blas"}))
+    libraries = {"linear algebra": kernels} | {name: version(name) for name in LIBRARIES}
+    return {"processor": processor, "python": platform.python_version()} | libraries
 
 
 def digest(item: Columns) -> str:
