@@ -76,7 +76,7 @@ def test_trials_that_are_there_are_cut_each_by_itself(log):
     alone = split(parts[1].drop(columns="trial").reset_index(drop=True), "lasting_s", 20.0)
     own = cut[cut["trial"].str.startswith("B")].reset_index(drop=True)
     pd.testing.assert_frame_equal(own[["t_s", *POSE, *COMMANDS, "run_up"]], alone[["t_s", *POSE, *COMMANDS, "run_up"]])
-    assert "session_s" not in cut  # times begin anew with each trial: nobody knows when it was
+    assert "session_s" not in cut  # times start again with each trial
     with pytest.raises(DataError, match=r"cuts none of the 1 trials"):
         split(parts[2], "lasting_s", 20.0)
 
