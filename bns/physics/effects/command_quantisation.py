@@ -85,6 +85,10 @@ def _drives(wheels: Wheels) -> tuple[Array, Array, NDArray[np.int64], Array]:
     speed = (told[..., 1:] + told[..., :-1]) / 2.0
     _, first, which = np.unique(drive[there], return_index=True, return_inverse=True)
     ways = np.concatenate([np.bincount(which, one[there]) for one in rolled])
+    if there is same:  # all of a drive at one speed
+        times: Array = np.tile(np.bincount(which, lasted[there]).astype(np.float64), 2)
+        driven = np.concatenate([np.bincount(which, one[there] * lasted[there]) for one in speed])
+        return driven / times, times, np.arange(len(times), dtype=np.int64), ways
     first = np.concatenate([first, first + len(which)])
     return np.concatenate([one[there] for one in speed]), np.tile(lasted[there], 2), first.astype(np.int64), ways
 
