@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from os import PathLike
 from typing import TYPE_CHECKING, Any, cast
 
 import pandas as pd
 
 from bns.api.common.arguments import checked_progress
 from bns.api.common.cache import remembered
-from bns.api.common.prepared import Prepared, prepared, prepared_networks
+from bns.api.common.prepared import Prepared, PreparedNetworks, are_networks, prepared, prepared_networks
 from bns.api.common.progress import Meter, Progress
 from bns.api.common.provenance import provenance
 from bns.api.common.shown import Shown
 from bns.api.measurements import Log, Measurements
 from bns.api.model import Given, Model
+from bns.diagnose.adding import fitted_to, model_yaml
 from bns.diagnose.comparison import Comparison
 from bns.diagnose.comparison import compare as held_against
 from bns.diagnose.predict.networks import NetworkPredictor
@@ -23,7 +26,8 @@ from bns.diagnose.report.text import ahead, comparison_text
 from bns.diagnose.residuals.network_errors import NetworkErrors, why_wrong
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.settings.chosen import in_force
-from bns.errors import DataError
+from bns.errors import DataError, ModelError
+from bns.physics import model as physics
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,6 +60,20 @@ class CompareResult(Shown):
         table = pd.DataFrame(self.comparison.errors).T
         table["noise_floor_m"] = pd.Series({h: self.comparison.noise_floor_m(h) for h in self.comparison.errors})
         return table.rename_axis("horizon")
+
+    @property
+    def changes(self) -> pd.DataFrame:
+        """One row per further model and horizon, on the windows of `errors`: position_m and position_median_m of that model (m),
+        change_m (its root mean square minus that of the model compared) with its 95 % interval low_m, high_m, paired by trial
+        (NaN where trials are few)."""
+        rows = [
+            {"model": e.models[1].name, "horizon": h, "position_m": e.models[1].rms_m, "position_median_m": e.models[1].median_m}
+            | {"change_m": e.changes[0].change_m, "low_m": e.changes[0].low_m, "high_m": e.changes[0].high_m}
+            for errors in self.comparison.beside
+            for h, e in errors.horizons.items()
+        ]
+        columns = ["model", "horizon", "position_m", "position_median_m", "change_m", "low_m", "high_m"]
+        return pd.DataFrame(rows, columns=columns).set_index(["model", "horizon"])
 
     @property
     def residual_dependence(self) -> pd.DataFrame:
@@ -108,34 +126,74 @@ class CompareResult(Shown):
 
 @in_force(DEFAULTS)
 def compare(
-    log: Log, model: Given, *, fresh: bool = False, progress: Progress | None = None
+    log: Log,
+    model: Given,
+    *,
+    beside: Given | Sequence[Given] = (),
+    fresh: bool = False,
+    progress: Progress | None = None,
 ) -> CompareResult:
     """Compare a model, as it is, with measurements; nothing is fitted.
 
     Args:
         log: a file, a table, or `bns.Measurements`.
         model: `bns.Model`, the name or file of one, networks (.safetensors), or a robot's static simulator (``snake``).
+        beside: one more model, or several: their errors on the same windows, and the change from ``model`` to each of them
+            with its 95 % interval, paired by trial (`CompareResult.changes`). Measurements that none of them was fitted to
+            say whether an effect that was added is worth it.
         fresh: compute the answer again instead of taking it from the cache (docs/python.md).
         progress: called with the fraction done (0 to 1) and a text.
 
     Raises:
         DataError: measurements that cannot be used, or of another robot.
-        ModelError: no such model.
+        ModelError: no such model, or networks among several.
     """
     checked_progress(progress)
+    others = _several(beside)
     networks = prepared_networks(log, model)
+    if networks and others:
+        raise ModelError(f"{networks.model.name} holds networks; only models with effects are compared beside others.")
     ready = networks or prepared(log, model)
+    named = _named(ready, others)
     meter = Meter(progress, PHASES, pace=1)
 
-
     def work() -> Comparison:
-        return held_against(ready.predictor, ready.model, tick=meter)
+        return held_against(ready.predictor, ready.model, tick=meter, beside=named)
 
-    result = remembered("compare", ready, (), work, Comparison, fresh) if isinstance(ready, Prepared) else work()
+    also = [[name, one.canonical_json(), model_yaml(one)] for name, one in named]
+    result = remembered("compare", ready, also, work, Comparison, fresh) if isinstance(ready, Prepared) else work()
     kept = isinstance(ready.predictor, NetworkPredictor) and ready.predictor.learned_from.size > 0
     causes = why_wrong(cast("NetworkPredictor", ready.predictor)) if kept else None
     of_networks = isinstance(ready.predictor, NetworkPredictor)
     meter.done()
     used = ready.thinned if isinstance(ready, Prepared) else ""
-    notes = (ready.fitted_here,) if isinstance(ready, Prepared) and ready.fitted_here else ()
+    notes = _fitted_here(ready, named) if isinstance(ready, Prepared) else ()
     return CompareResult(ready.log, ready.model, result, causes, of_networks, used, notes)
+
+
+def _several(beside: Given | Sequence[Given]) -> tuple[Given, ...]:
+    return tuple(beside) if isinstance(beside, list | tuple) else (cast("Given", beside),)
+
+
+def _named(ready: Prepared | PreparedNetworks, others: Sequence[Given]) -> list[tuple[str, Model]]:
+    """Further models, each checked as the first, under names of their own."""
+    named: list[tuple[str, Model]] = []
+    taken = {ready.model.name}
+    for number, given in enumerate(others, start=2):
+        if isinstance(given, physics.Model | str | PathLike) and are_networks(given):
+            raise ModelError(f"{given} holds networks; only models with effects are compared beside others.")
+        one = prepared(ready.log, given).model
+        name = one.name if one.name not in taken else f"{one.name} ({number})"
+        taken.add(name)
+        named.append((name, one))
+    return named
+
+
+def _fitted_here(ready: Prepared, named: Sequence[tuple[str, Model]]) -> tuple[str, ...]:
+    """What to beware of: models that were fitted to these measurements know them."""
+    of_others = [
+        f"The model {name} was fitted to these very measurements ({ready.log.name}): its errors are lower than on new ones."
+        for name, one in named
+        if fitted_to(one, ready.measured.digest)
+    ]
+    return tuple(note for note in (ready.fitted_here, *of_others) if note)

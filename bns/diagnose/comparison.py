@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,10 +14,10 @@ from bns.diagnose.estimate.clocks.trial_clock_test import steps_of
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.parallel import one_thread_each
-from bns.diagnose.predict.base import Predictor
+from bns.diagnose.predict.base import Predictor, Steps
 from bns.diagnose.predict.check_robot import hint_on_wheelbase
 from bns.diagnose.predict.horizons import Errors
-from bns.diagnose.predict.paired_errors import PairedErrors, judged_windows, noise_json, paired_errors, plain
+from bns.diagnose.predict.paired_errors import PairedErrors, PairedWindows, judged_windows, noise_json, plain
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.along_variables import ResidualDependence, residual_dependence
 from bns.diagnose.settings import DEFAULTS
@@ -69,6 +69,8 @@ class Comparison:
     scores: Mapping[str, Mapping[str, float]]
     hint: str = ""
     """A question about the wheelbase, where one factor on all turns would make most of the error go."""
+    beside: tuple[PairedErrors, ...] = ()
+    """Of each further model: this one and that one, on the windows that ``judged`` has, and the change from this to that."""
 
     def as_json(self) -> dict[str, Any]:
         """One object of plain values."""
@@ -89,6 +91,7 @@ class Comparison:
             ],
             "worst": [vars(w) for w in self.worst],
             "hint": self.hint,
+            "beside": [errors.as_json() for errors in self.beside],
             "networks": {name: dict(score) for name, score in self.scores.items()},
         }
 
@@ -107,9 +110,16 @@ def _plain(value: float) -> float | None:
 
 @one_thread_each()
 def compare(
-    predictor: Predictor, model: Model, seed: int = 0, tick: Callable[[str], None] = lambda _: None
+    predictor: Predictor,
+    model: Model,
+    seed: int = 0,
+    tick: Callable[[str], None] = lambda _: None,
+    beside: Sequence[tuple[str, Model]] = (),
 ) -> Comparison:
-    """Hold a model as it is against tracks. ``seed`` draws the bootstrap of the bands; ``tick`` is told what is being done."""
+    """Hold a model as it is against tracks. ``seed`` draws the bootstrap of the bands; ``tick`` is told what is being done.
+
+    ``beside``: further models under their names, as they are, whose errors are paired with this one's.
+    """
     tracks = predictor.tracks
     if not (np.diff(tracks.first) > 1).any():
         raise DataError(
@@ -120,7 +130,9 @@ def compare(
     tick("errors")
     fit = _as_is(problem, model)
     steps = steps_of(predictor, problem.pose_filter, fit.model)
-    judged = paired_errors(predictor, [(model.name, steps)])
+    windows = PairedWindows(predictor)
+    judged = windows.errors([(model.name, steps)])
+    others = [(name, _predicted(predictor, other)) for name, other in beside]
     errors = {h: judged_windows(predictor, steps, h) for h in predictor.horizons}
     tick("what explains them")
     dependence = residual_dependence(problem, fit)
@@ -137,7 +149,14 @@ def compare(
         predictor.near,
         predictor.scores(),
         hint_on_wheelbase(predictor, model) if isinstance(predictor, WheelPredictor) else "",
+        tuple(windows.errors([(model.name, steps), other]) for other in others),
     )
+
+
+def _predicted(predictor: Predictor, model: Model) -> Steps:
+    """What a model predicts as it stands, in the way of the model that is compared."""
+    problem = problem_for(predictor, model)
+    return steps_of(predictor, problem.pose_filter, _as_is(problem, model).model)
 
 
 def _as_is(problem: Any, model: Model) -> Fit:

@@ -55,6 +55,14 @@ def add_commands(command: Adder) -> None:
         help="print a proposed mapping (YAML), or write it to -o FILE: bns import LOG --propose -o LOG.import.yaml",
     )
     held = command("compare", compare, "show how large the errors of a model are, and where they occur")
+    held.add_argument(
+        "--beside",
+        type=str,
+        action="append",
+        default=[],
+        metavar="M",
+        help="a further model: its error on the same windows, and the change with its 95 %% interval (may be repeated)",
+    )
     found = command(
         "diagnose", diagnose, "name the physical effect that a model lacks, with its certainty and its alternatives"
     )
@@ -205,7 +213,7 @@ def compare(options: argparse.Namespace) -> int:
 
     model, log = model_of(options), log_of(options)
     with ticking("comparing") as tick:
-        seen = held_against(log, model, fresh=options.fresh, progress=tick)
+        seen = held_against(log, model, beside=_beside(options), fresh=options.fresh, progress=tick)
     _say_used(seen.used)
     if seen.of_networks and seen.causes is None:
         print(
@@ -386,6 +394,14 @@ def model_of(options: argparse.Namespace) -> Given:
             raise ModelError(no_wheels(str(options.model)))
         return str(options.model)
     return Model(options.model, **({} if options.wheelbase is None else {"wheelbase_m": options.wheelbase}))
+
+
+def _beside(options: argparse.Namespace) -> list[Given]:
+    """The further models; the drive that has no wheelbase of its own takes that of the options."""
+    from bns.api.model import Model
+
+    wheels = {} if options.wheelbase is None else {"wheelbase_m": options.wheelbase}
+    return [Model(name, **wheels) if wheels and name == "differential-drive" else name for name in options.beside]
 
 
 def _say_used(how_much: str) -> None:

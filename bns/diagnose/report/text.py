@@ -218,10 +218,10 @@ def _why_unknown(horizons: Iterable[str]) -> str:
     return "of a body only the ends of a stretch are compared" if {"cycle", "stretch"} & set(horizons) else UNKNOWN_NOISE
 
 
-def error_lines(errors: PairedErrors, before_added: str = "") -> Iterator[str]:
+def error_lines(errors: PairedErrors, before_added: str = "", of_noise: bool = True) -> Iterator[str]:
     """A table of the errors of models in turn, one row a horizon and model, with the change from the one before.
 
-    ``before_added``: stands before the names of all models but the first.
+    ``before_added``: stands before the names of all models but the first. ``of_noise``: say at the end what the noise is.
     """
     yield f"  {'horizon':10}{'model':26}{'error':>16}{'change (95 %)':>30}{'noise':>8}{'windows':>9}"
     for horizon, e in errors.horizons.items():
@@ -236,6 +236,8 @@ def error_lines(errors: PairedErrors, before_added: str = "") -> Iterator[str]:
     if any(e.left_out for e in errors.horizons.values()):
         left_out = ", ".join(f"{e.left_out} at {h}" for h, e in errors.horizons.items() if e.left_out)
         yield f"  (windows excluded because the tracker jumps within them or poses were left out: {left_out})"
+    if not of_noise:
+        return
     if errors.noise is None:
         yield f"  (noise not known: {_why_unknown(errors.horizons)})"
     else:
@@ -301,6 +303,10 @@ def _comparison(c: Comparison) -> Iterator[str]:
         yield f"  (noise: error that tracking noise alone would cause{least}; the scatter of the drive is not included)"
     if c.hint:
         yield f"  {c.hint}"
+    for errors in c.beside:
+        other = next(iter(errors.horizons.values())).models[1].name
+        yield f"\n{other} beside {c.model}, mm: root mean square (median), both as they are, on the same windows:"
+        yield from error_lines(errors, of_noise=False)
     yield "\nwhere it fails: fraction of the loss that a free curve along each variable would remove, on held-out trials:"
     yield f"  {'variable':30}{'velocity':16}{'fraction':>14}{'p':>10}"
     for p in c.residual_dependence[:_SHOWN]:
