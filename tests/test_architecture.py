@@ -81,6 +81,7 @@ DIAGNOSE_FLOORS = (
     {"select", "residuals"},
     {"values"},
     {"outcome"},
+    {"effect_caveats"},
     {"caveats"},
     {"adding", "comparison", "diagnosis"},
     {"design"},

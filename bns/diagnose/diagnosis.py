@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bns.diagnose.caveats import notes_on, on_many_apart, on_worst
+from bns.diagnose.caveats import notes_on
 from bns.diagnose.data.split_trials import finer
 from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.estimate.calibration import calibrated, wheel_sizes
@@ -31,6 +31,7 @@ from bns.diagnose.residuals.outliers import one_wheel
 from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.residuals.together import formula_in_words, said_of
 from bns.diagnose.residuals.unexplained import NOTHING, Unexplained
+from bns.diagnose.residuals.worst_in_words import on_many_apart, on_worst
 from bns.diagnose.residuals.worst_trials import WithoutWorst, apart, far_off, most_left_out, standing_out
 from bns.diagnose.select.equivalents import TRIED, equivalent_pairs
 from bns.diagnose.select.result import Candidate, SelectionResult

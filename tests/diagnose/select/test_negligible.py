@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.diagnose import caveats, outcome
+from bns.diagnose import caveats, effect_caveats, outcome
 from bns.diagnose.caveats import notes_on
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosis import diagnose
@@ -115,7 +115,7 @@ def test_a_diagnosis_says_what_is_negligible(monkeypatch):
 
     beside = []
     monkeypatch.setattr(outcome, "negligible_and_errors", judged)
-    monkeypatch.setattr(caveats, "_on_moved", lambda found: beside.append(found.beside_negligible) or [])
+    monkeypatch.setattr(caveats, "on_moved", lambda found: beside.append(found.beside_negligible) or [])
     found = diagnose(predictor(), NOMINAL)
     assert set(beside[0]) == set(found.effects)
     assert beside[0]["wheelbase"]["factor"]["value"] == pytest.approx(1.05, abs=5e-3)
@@ -328,7 +328,7 @@ def test_an_effect_that_only_the_error_of_the_heading_shows_is_said(without, see
     exact = {name: {**judged.of(name), 2.0: SimpleNamespace(rms_m=0.0, heading_rad=0.0, median_m=0.0)} for name in ("one", "all")}
     two = SimpleNamespace(of=exact.get, horizons=dict.fromkeys((horizon, 2.0), judged.horizons[horizon]))
     assert seen_in_heading(two, ["one"]) == found  # no heading is off where no pose is
-    words = list(caveats._on_heading({name: ("trial", *two) for name, (_, *two) in found.items()}))
+    words = list(effect_caveats.on_heading({name: ("trial", *two) for name, (_, *two) in found.items()}))
     assert words == ["one lowers the error of the heading (over the whole trial from 2.5e+02 to 1e+02 mrad), and no error of "
                      "position by 2% or more."] * seen  # fmt: skip
 
@@ -367,7 +367,7 @@ def test_numbers_that_what_is_negligible_moves_are_said():
         found = SimpleNamespace(
             selection=SimpleNamespace(fit=fit_of(now)), beside_negligible=numbers, negligible={"slope-load": {}}
         )
-        return list(caveats._on_moved(found))
+        return list(effect_caveats.on_moved(found))
 
     said = "With slope-load in the model, the parameters of floor-slope differ: x_m_s = 0.004 m/s, not 0.0045."
     assert notes(0.0045, 0.004) == [said]
@@ -477,6 +477,6 @@ def test_what_no_error_shows_is_kept_for_the_numbers_that_would_shift(monkeypatc
     assert gain.of(lacking) == 1.0
     kept = {"speed-gain": (Shift("dead-zone", "width_m_s", "m/s", 5e-3, 6.5e-3),)}
     assert negligible_and_errors(selection) == ((), "errors", kept)
-    (said,) = caveats._on_kept(kept)
+    (said,) = effect_caveats.on_kept(kept)
     assert said.startswith("speed-gain is certain, but without it no error on held-out trials is higher by 2% or more.")
     assert "without it width_m_s of dead-zone would be 0.0065 m/s instead of 0.005: measure one of these" in said
