@@ -80,6 +80,8 @@ DIAGNOSE_FLOORS = (
     {"estimate"},
     {"select", "residuals"},
     {"values"},
+    {"standing"},
+    {"beside_terms"},
     {"outcome"},
     {"effect_caveats"},
     {"caveats"},
