@@ -12,14 +12,11 @@ from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.paired_errors import PairedErrors
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.along_variables import residual_dependence
-from bns.diagnose.residuals.established import Established, established, left_over
+from bns.diagnose.residuals.earned_terms import left_over
+from bns.diagnose.residuals.established import Established, established
 from bns.diagnose.residuals.unexplained import Unexplained, unexplained
 from bns.diagnose.select.known_effects import known_effects
-from bns.diagnose.select.negligible import (
-    below_noise,
-    fall_matters,
-    negligible_and_errors,
-)
+from bns.diagnose.select.negligible import below_noise, fall_matters, negligible_and_errors
 from bns.diagnose.select.result import SelectionResult, certainly_lower
 from bns.diagnose.standing import Standing, explained_by, standing_of, with_effects
 from bns.physics.model import Model

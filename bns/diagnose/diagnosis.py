@@ -25,7 +25,7 @@ from bns.diagnose.predict.paired_errors import PairedErrors, noise_json, plain
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.along_variables import ResidualDependence
 from bns.diagnose.residuals.drive_scatter import scatter_in_words
-from bns.diagnose.residuals.established import curve_does_better
+from bns.diagnose.residuals.earned_terms import curve_does_better
 from bns.diagnose.residuals.grammar import PAST
 from bns.diagnose.residuals.outliers import one_wheel
 from bns.diagnose.residuals.symbolic import Formula

@@ -22,13 +22,7 @@ from bns.diagnose.predict.paired_errors import PairedErrors, paired_errors
 from bns.diagnose.residuals.along_variables import ResidualDependence
 from bns.diagnose.residuals.symbolic import Formula, best_formula
 from bns.diagnose.residuals.unexplained import NOTHING, Unexplained, without_moments_explained
-from bns.diagnose.select.negligible import (
-    LEAST_FALL,
-    Shift,
-    fall_matters,
-    negligible_and_errors,
-    seen_in_heading,
-)
+from bns.diagnose.select.negligible import LEAST_FALL, Shift, fall_matters, negligible_and_errors, seen_in_heading
 from bns.diagnose.select.result import SelectionResult
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.standing import (

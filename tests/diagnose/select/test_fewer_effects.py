@@ -18,7 +18,7 @@ from bns.diagnose.estimate.plausibility import does_nothing
 from bns.diagnose.predict.paired_errors import PairedErrors
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report.text import _effects_but, _with_interval, diagnosis_text, enumerated
-from bns.diagnose.residuals import established as established_module
+from bns.diagnose.residuals import restored
 from bns.diagnose.residuals.established import Established
 from bns.diagnose.residuals.outliers import Outlier
 from bns.diagnose.residuals.symbolic import fitted
@@ -349,11 +349,11 @@ def test_a_curve_that_predicts_better_by_luck_does_not_bar_an_effect(monkeypatch
             of=lambda name: {h: SimpleNamespace(rms_m=by_model[name]) for h, by_model in rms_m.items()},
         )
 
-    monkeypatch.setattr(established_module, "paired_errors", errors_of)
-    monkeypatch.setattr(established_module, "held_out_steps", lambda *_: None)
+    monkeypatch.setattr(restored, "paired_errors", errors_of)
+    monkeypatch.setattr(restored, "held_out_steps", lambda *_: None)
     fit = SimpleNamespace(model=None)
     effects = SimpleNamespace(fit=fit, problem=SimpleNamespace(pose_filter=None))
-    assert established_module._least_share_m(None, effects, fit, fit) == pytest.approx(share)
+    assert restored._least_share_m(None, effects, fit, fit) == pytest.approx(share)
 
 
 PAIR = ("effects", "terms")

@@ -14,8 +14,8 @@ from bns.diagnose.estimate.plausibility import implausible
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_with, listed
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.residuals import established as curves
-from bns.diagnose.residuals.established import curve_does_better
+from bns.diagnose.residuals import earned_terms as curves
+from bns.diagnose.residuals.earned_terms import curve_does_better
 from bns.diagnose.select.acceptance import Acceptance
 from bns.diagnose.select.result import SelectionResult, SelectionStep
 from bns.diagnose.select.stepwise import StepwiseSelection
@@ -326,8 +326,8 @@ def test_beside_several_effects_the_search_ends_where_a_curve_does_better(monkey
 @pytest.mark.parametrize("names", [("wheelbase",), ("wheelbase", "motor-lag"), ("wheelbase", "motor-lag", "side-slip")])
 @pytest.mark.parametrize("unlisted", [False, True])
 def test_curves_do_better_only_than_effects_that_are_not_there(monkeypatch, unlisted, names):
-    asked, better_term = [], curves._better_term
-    monkeypatch.setattr(curves, "_better_term", lambda *which: asked.append(which) or better_term(*which))
+    asked, better_term = [], curves.better_term
+    monkeypatch.setattr(curves, "better_term", lambda *which: asked.append(which) or better_term(*which))
     true = hidden(wheelbase={"factor": 1.05}, motor_lag={"tau_s": 0.15}, side_slip={"slip_s": 0.1})
     if unlisted:
         true = NOMINAL.with_active(formula_effect("rough", "k * exp(-tau / 2)", "share"), (-0.15,))
