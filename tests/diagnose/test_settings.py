@@ -27,8 +27,8 @@ NO_SETTINGS = {
     ("report/people.py", "_UNITS"): "factors between units, by definition",
     ("residuals/floor_field.py", "_WIDE_M"): "wider than the floor that tents cover, so that all of them are meant",
     ("predict/stretches.py", "_RIMS"): "where a rim has the friction of the floor within 1 %: saves simulations alone",
-    ("residuals/words.py", "_WAYS"): "a metre, driven lately and before: where a curve is put in words",
-    ("residuals/words.py", "_POINTS"): "points at which a curve is evaluated to be put in words",
+    ("residuals/past_in_words.py", "_WAYS"): "a metre, driven lately and before: where a curve is put in words",
+    ("residuals/phrases.py", "POINTS"): "points at which a curve is evaluated to be put in words",
 }
 """Numbers that stand in a module, and why they decide nothing that could be decided otherwise."""
 
