@@ -86,6 +86,7 @@ DIAGNOSE_FLOORS = (
     {"effect_caveats"},
     {"caveats"},
     {"adding", "comparison", "diagnosis"},
+    {"diagnosing"},
     {"design"},
     {"report"},
 )

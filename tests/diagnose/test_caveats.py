@@ -20,7 +20,8 @@ from bns.diagnose.caveats import (
     notes_on,
 )
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import Diagnosis, diagnose
+from bns.diagnose.diagnosing import diagnose
+from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.effect_caveats import _on_drift, _on_times, implausible_text, on_effects
 from bns.diagnose.estimate.smoothing_tracker import SmoothingTracker
 from bns.diagnose.predict.paired_errors import Change, HorizonErrors, ModelError, PairedErrors

@@ -82,9 +82,9 @@ def test_copies_of_a_setting_in_other_modules_follow_it():
     with in_force(other):
         assert (checks._JUMP_M, tracker_faults.LEAST_M) == (0.5, 0.5)
         assert stepwise.MIN_GAIN == 0.25
-        from bns.diagnose import diagnosis
+        from bns.diagnose import diagnosing
 
-        assert diagnosis.MIN_GAIN == 0.25
+        assert diagnosing.MIN_GAIN == 0.25
     assert before == (checks._JUMP_M, tracker_faults.LEAST_M, stepwise.MIN_GAIN)
 
 

@@ -37,7 +37,7 @@ from bns.diagnose.design.sequences import (
     short_durations,
     uniform,
 )
-from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.diagnosing import diagnose
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report.proposal_text import proposal_lines, proposal_text

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.diagnose import diagnosis
+from bns.diagnose import diagnosing
 from bns.diagnose.estimate.fit import Problem
 from bns.diagnose.estimate.noise import gathered, huber, length
 from bns.diagnose.predict.responses import Responses
@@ -258,5 +258,5 @@ def test_a_sign_of_too_few_trials_is_judged_by_all_effects_that_were_screened(of
     candidate = SimpleNamespace(name="clock-drift", rejected_because="", paired_comparison=earned)
     step = SelectionStep((candidate, candidate), 0.1, "", of=of_how_many)
     found = SimpleNamespace(accepted=(), steps=(step,), nominal=SimpleNamespace(losses=np.ones(9)))
-    assert (diagnosis._hint(found, 9) is candidate) is hinted
-    assert diagnosis._hint(found, 9, {"clock-drift"}) is None  # said to lower no error: more trials are not asked for, too
+    assert (diagnosing._hint(found, 9) is candidate) is hinted
+    assert diagnosing._hint(found, 9, {"clock-drift"}) is None  # said to lower no error: more trials are not asked for, too

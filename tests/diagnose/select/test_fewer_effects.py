@@ -11,7 +11,8 @@ from bns.diagnose import beside_terms, outcome
 from bns.diagnose import standing as standing_module
 from bns.diagnose.adding import warnings_on
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import Diagnosis, diagnose
+from bns.diagnose.diagnosing import diagnose
+from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.parameters import FreeParameter
 from bns.diagnose.estimate.plausibility import does_nothing
@@ -178,7 +179,7 @@ def test_a_diagnosis_whose_search_lost_an_effect_keeps_its_tie(late, monkeypatch
         kept = found.selection.only(found.selection.accepted)
         return replace(found, selection=kept, withdrawn=("speed-gain",))
 
-    monkeypatch.setattr("bns.diagnose.diagnosis.outcome_of", losing)
+    monkeypatch.setattr("bns.diagnose.diagnosing.outcome_of", losing)
     found = diagnose(late, NOMINAL)
     assert found.verdict == "tie"
     assert {*found.effects, *found.selection.competing_models[0]} == {"clock-offset", "command-delay"}
@@ -197,7 +198,7 @@ def test_beside_terms_too_it_is_asked_what_competes(late, monkeypatch, terms):
 
     plain = outcome.outcome_of
     monkeypatch.setattr(
-        "bns.diagnose.diagnosis.outcome_of", lambda *given: replace(plain(*given), withdrawn=("speed-gain",), terms=terms)
+        "bns.diagnose.diagnosing.outcome_of", lambda *given: replace(plain(*given), withdrawn=("speed-gain",), terms=terms)
     )
     monkeypatch.setattr(StepwiseSelection, "competing", asked)
     with pytest.raises(AskedError) as ended:

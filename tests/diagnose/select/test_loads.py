@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.diagnosing import diagnose
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.plausibility import fitted_again
 from bns.diagnose.estimate.starts import fit_extended

@@ -10,7 +10,7 @@ import pytest
 from bns.diagnose import beside_terms, caveats, effect_caveats, outcome, standing
 from bns.diagnose.caveats import notes_on
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.diagnosing import diagnose
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.parameters import FreeParameter
 from bns.diagnose.estimate.problem import problem_for

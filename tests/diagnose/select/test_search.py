@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.diagnose import diagnosis
+from bns.diagnose import diagnosing
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import _from_better_numbers, diagnose
+from bns.diagnose.diagnosing import _from_better_numbers, diagnose
 from bns.diagnose.estimate.plausibility import implausible
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_with, listed
@@ -277,7 +277,7 @@ def test_what_could_stand_in_place_of_the_newest_effect_is_known_from_the_round_
         ({"losses": 1e4}, False),  # nothing beside what is lost anyway
         ({"rejected_because": "at its bound"}, False),
         ({"accepted": ("wheelbase",)}, False),
-        ({"trials": diagnosis.FEW_TRIALS}, False),
+        ({"trials": diagnosing.FEW_TRIALS}, False),
         ({"unexplained": True}, False),
     ],
 )
@@ -289,7 +289,7 @@ def test_a_sign_is_worth_more_trials_only_where_few_nearly_sufficed(change, hint
     candidate = SimpleNamespace(name="turn-slip", rejected_because=given["rejected_because"], paired_comparison=earned)
     nominal = SimpleNamespace(losses=np.full(12, given["losses"]))
     found = SimpleNamespace(accepted=given["accepted"], steps=(SelectionStep((candidate,), 0.5, ""),), nominal=nominal)
-    assert (diagnosis._hint(found, given["trials"], unexplained=given["unexplained"]) is candidate) is hinted
+    assert (diagnosing._hint(found, given["trials"], unexplained=given["unexplained"]) is candidate) is hinted
 
 
 @pytest.mark.parametrize("better", [(False,), (True, True, True), (True, False)])
