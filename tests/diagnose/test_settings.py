@@ -19,7 +19,7 @@ NO_SETTINGS = {
     ("residuals/grammar.py", "_SMALL"): "step of a difference quotient of a linear term",
     ("data/mapping.py", "UNITS"): "factors between units, by definition",
     ("data/robust.py", "_NORMAL"): "the median of a standard normal number's size",
-    ("estimate/fit.py", "_LATELY"): "the size of a cache: the answers are the same for any",
+    ("estimate/fitting.py", "_LATELY"): "the size of a cache: the answers are the same for any",
     ("predict/paired_errors.py", "_LATELY"): "the size of a cache: the answers are the same for any",
     ("parallel.py", "MOST"): "threads: the answers are the same for any number",
     ("predict/wheels.py", "_KEPT"): "the size of a cache: the answers are the same for any",

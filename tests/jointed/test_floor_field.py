@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bns.diagnose import standing
-from bns.diagnose.estimate.fit import Problem
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.predict.jointed import JointedPredictor
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.floor_field import imitating_floor

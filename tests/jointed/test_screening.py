@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bns.diagnose import diagnosing
-from bns.diagnose.estimate.fit import Problem
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.noise import gathered, huber, length
 from bns.diagnose.predict.responses import Responses
 from bns.diagnose.select import forwards, screening

@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from bns.diagnose.data.tracks import Array
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.significance import paired_elpd_diff
 from bns.diagnose.predict.jointed import JointedPredictor
 from bns.diagnose.residuals.along_variables import CHANCE, with_columns

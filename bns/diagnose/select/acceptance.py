@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.plausibility import at_bound, implausible, undetermined
 from bns.diagnose.select.extending import extended, fits_better, reduced, variant
 from bns.diagnose.select.negligible import certainly_better

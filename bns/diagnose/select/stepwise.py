@@ -17,7 +17,8 @@ from bns.diagnose.estimate.clocks.trial_clock_test import (
     fit_trial_clocks,
     with_shared_clock,
 )
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.lacking import fit_without
 from bns.diagnose.estimate.plausibility import believable, limiting
 from bns.diagnose.estimate.problem import settled_problem

@@ -327,7 +327,7 @@ def test_a_term_that_is_idle_beside_later_ones_goes(monkeypatch):
     assert [term.name for term in ended.terms] == ["term-1"]
     assert without_idle_terms(predictor, ended, 0.01) is ended
     certain = SimpleNamespace(elpd_diff=20.0, dse=2.0, p_value=1e-5, z=10.0)
-    monkeypatch.setattr("bns.diagnose.estimate.fit.Problem.paired_comparison", lambda *_: certain)
+    monkeypatch.setattr("bns.diagnose.estimate.fitting.Problem.paired_comparison", lambda *_: certain)
     assert [term.name for term in without_idle_terms(predictor, state, 0.01).terms] == ["term-1"]
     both = drawn_by_curves(predictor_of(warming(-0.2, dead_zone={"width_m_s": 0.02})), *FOUND_TOGETHER)
     assert without_idle_terms(both.problem.predictor, both, 0.01) is both
