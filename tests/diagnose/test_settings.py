@@ -16,7 +16,7 @@ from bns.physics.model import load_model
 DIAGNOSE = Path(bns.__file__).parent / "diagnose"
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 NO_SETTINGS = {
-    ("residuals/grammar.py", "_SMALL"): "step of a difference quotient of a linear term",
+    ("residuals/ranked_families.py", "_SMALL"): "step of a difference quotient of a linear term",
     ("data/mapping.py", "UNITS"): "factors between units, by definition",
     ("data/robust.py", "_NORMAL"): "the median of a standard normal number's size",
     ("estimate/fitting.py", "_LATELY"): "the size of a cache: the answers are the same for any",

@@ -8,20 +8,8 @@ from dataclasses import replace
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.significance import MIN_Z, PairedComparison, paired_elpd_diff
-from bns.diagnose.residuals.grammar import (
-    PLACE,
-    SPEED_THERE,
-    STEPPED,
-    Earned,
-    Family,
-    certain,
-    families,
-    may_join,
-    ranked,
-    rounding,
-    significant,
-    simpler_first,
-)
+from bns.diagnose.residuals.grammar import PLACE, SPEED_THERE, STEPPED, Family, families, may_join
+from bns.diagnose.residuals.ranked_families import Earned, certain, ranked, rounding, significant, simpler_first
 from bns.diagnose.residuals.search_state import State
 from bns.diagnose.residuals.symbolic import Formula, fitted, free_name, patch
 from bns.diagnose.settings import DEFAULTS

@@ -15,7 +15,7 @@ from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.significance import paired_elpd_diff
 from bns.diagnose.predict.jointed import JointedPredictor
 from bns.diagnose.residuals.along_variables import CHANCE, with_columns
-from bns.diagnose.residuals.grammar import certain
+from bns.diagnose.residuals.ranked_families import certain
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.jointed.pieced import Piece, PiecedEffect
 

@@ -30,11 +30,9 @@ from bns.diagnose.residuals.grammar import (
     SURFACE,
     families,
     may_join,
-    ranked,
-    rounding,
-    significant,
 )
 from bns.diagnose.residuals.pruned import without_idle_terms, without_needless_terms
+from bns.diagnose.residuals.ranked_families import ranked, rounding, significant
 from bns.diagnose.residuals.restored import restored
 from bns.diagnose.residuals.search_state import State
 from bns.diagnose.residuals.symbolic import fitted, free_name
