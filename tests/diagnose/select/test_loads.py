@@ -11,7 +11,7 @@ from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.plausibility import fitted_again
 from bns.diagnose.estimate.starts import fit_extended
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.select import extending, forwards, look_back
+from bns.diagnose.select import acceptance, extending, forwards, look_back
 from bns.diagnose.select.stepwise import StepwiseSelection
 from bns.diagnose.values import numbers_of
 from bns.physics.effects import all_effects, effect_named
@@ -35,7 +35,8 @@ def test_turns_that_lag_less_than_straight_lines_take_the_lags_place():
 
 
 def test_an_extension_that_lowers_no_error_is_not_taken(monkeypatch):
-    monkeypatch.setattr(forwards, "certainly_better", lambda *_: False)
+    for module in (acceptance, forwards, look_back):
+        monkeypatch.setattr(module, "certainly_better", lambda *_: False)
     found = selected(hidden(inertia_lag={"tau_s": 0.25, "turn_ratio": 0.3}), trials=12)
     assert "inertia-lag" not in found.accepted
     assert "motor-lag" in found.accepted
@@ -360,7 +361,13 @@ def test_a_lag_from_the_bench_stays_where_turns_lag_alike():
 def test_an_extension_is_held_against_what_it_extends_under_the_same_noise(monkeypatch):
     """Else one came in that the look back threw out, round after round."""
     asked = []
-    monkeypatch.setattr(forwards, "certainly_better", lambda before, after: asked.append((before[0], after[0])) or len(asked) % 2)
+
+    def certainly_better(before, after):
+        asked.append((before[0], after[0]))
+        return len(asked) % 2
+
+    for module in (acceptance, forwards):
+        monkeypatch.setattr(module, "certainly_better", certainly_better)
     table = measured(hidden(inertia_lag={"tau_s": 0.25, "turn_ratio": 0.3}), trials=14, seed=11, speeds=(-0.2, 0.2))
     search = StepwiseSelection(WheelPredictor(tracks_of(table)), NOMINAL.with_effect("motor-lag", tau_s=0.2))
     problem, fit = search._refit_with_noise(search.model)
