@@ -80,9 +80,13 @@ DIAGNOSE_FLOORS = (
     {"estimate"},
     {"select", "residuals"},
     {"values"},
+    {"standing"},
+    {"beside_terms"},
     {"outcome"},
+    {"effect_caveats"},
     {"caveats"},
     {"adding", "comparison", "diagnosis"},
+    {"diagnosing"},
     {"design"},
     {"report"},
 )

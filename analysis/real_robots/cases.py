@@ -13,7 +13,8 @@ import pandas as pd
 import yaml
 
 from bns.diagnose.data.load import Measured, load_measured
-from bns.diagnose.diagnosis import Diagnosis, diagnose
+from bns.diagnose.diagnosing import diagnose
+from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.predict.paired_errors import paired_errors
 from bns.diagnose.predict.wheels import predictor_for_search
 from bns.diagnose.report.text import diagnosis_text

@@ -23,8 +23,8 @@ from bns.api.measurements import SAVED, Log, Measurements
 from bns.api.model import Given, Model
 from bns.diagnose.adding import documented
 from bns.diagnose.design.competing_models import Rival, rivals_of
+from bns.diagnose.diagnosing import diagnose as find
 from bns.diagnose.diagnosis import Diagnosis
-from bns.diagnose.diagnosis import diagnose as find
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.predict.paired_errors import PairedErrors
 from bns.diagnose.report.text import diagnosis_text

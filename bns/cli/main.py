@@ -15,6 +15,7 @@ from bns.cli.commands import calibrate as calibrating
 from bns.cli.commands import diagnose as measuring
 from bns.cli.commands import examples as listing
 from bns.cli.commands import explore as exploring
+from bns.cli.commands import import_log as importing
 from bns.cli.commands import report as reporting
 from bns.cli.commands import results as looking
 from bns.cli.commands import simulators as simulating
@@ -23,7 +24,7 @@ from bns.cli.compiling import say_if_compiling
 from bns.cli.options.option_types import add_spec_options, duration, positive
 from bns.cli.options.sweep_options import DEVICES, say_if_experimental
 from bns.cli.options.trial_options import add_looking_options, add_servo_options, add_trial_options
-from bns.cli.parser import SHELLS, Completion, Parser, add_results, add_trust, take_trust
+from bns.cli.parser import SHELLS, Adder, Completion, Parser, add_results, add_trust, take_trust
 from bns.cli.streams import usable_streams
 from bns.errors import BnsError
 from bns.spec import FIELDS, RunSpec
@@ -110,6 +111,7 @@ def _parser() -> Parser:
         return added
 
     listing.add_commands(command)
+    importing.add_commands(command)
     measuring.add_commands(command)
     reporting.add_commands(command)
     exploring.add_commands(command)
@@ -129,7 +131,7 @@ def _help_of(parser: Parser) -> Callable[[argparse.Namespace], int]:
     return show
 
 
-def _add_single_runs(command: measuring.Adder) -> None:
+def _add_single_runs(command: Adder) -> None:
     one = command("run", run, "carry out one run and draw its path")
     add_spec_options(one)
     one.add_argument(

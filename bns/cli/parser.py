@@ -72,6 +72,10 @@ class Parser(argparse.ArgumentParser):
         return {}
 
 
+Adder = Callable[[str, Callable[[argparse.Namespace], int], str], Parser]
+"""What makes the parser of a command, of its name, its function and a text."""
+
+
 def _written(action: argparse.Action) -> str:
     """An argument as it is written on the command line."""
     value = str(action.metavar or action.dest.upper())

@@ -15,8 +15,9 @@ import yaml
 from bns.diagnose.data.load import Measured
 from bns.diagnose.estimate.clocks.trial_clock_test import with_trial_clocks
 from bns.diagnose.estimate.cross_validation import AS_GIVEN, Judged, held_out_steps
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.fit_set import Tried, fit_set
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.plausibility import does_nothing, fitted_again, implausible, with_unit
 from bns.diagnose.estimate.problem import given_steps, problem_for
 from bns.diagnose.estimate.starts import fitting

@@ -15,8 +15,8 @@ from bns.api.common.next_command import limits_in_words, model_words, noted, rep
 from bns.api.common.prepared import prepared
 from bns.api.measurements import SAVED
 from bns.api.propose import ProposeResult
-from bns.cli.commands.diagnose import words_of
 from bns.cli.main import _parser
+from bns.cli.options.measuring_options import words_of
 from bns.cli.values import arena_of, pose_of, speeds_of
 from bns.diagnose.report.proposal_text import _next, proposal_text
 from bns.diagnose.report.tables import next_commands

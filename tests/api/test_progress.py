@@ -8,7 +8,7 @@ import pytest
 
 import bns
 from bns.api.common.progress import Meter, part
-from bns.cli.commands.diagnose import ticking, time_left
+from bns.cli.progress_bar import ticking, time_left
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
 

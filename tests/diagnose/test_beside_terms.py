@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bns.diagnose import outcome
+from bns.diagnose import beside_terms, outcome, standing
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.diagnosing import diagnose
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.paired_errors import paired_errors
@@ -82,12 +82,12 @@ def test_what_terms_bring_to_light_stays_where_the_error_falls_from_the_model_as
     with_effect = problem.fit(with_term.fit.model.with_effect("wheel-mismatch", ratio=1.0))
     found = Established(("wheel-mismatch",), (with_term,), problem, with_effect)
     without = Established((), (with_term,), problem, with_term.fit)
-    ratios = {"as given": 1.0, outcome.WITH_EFFECTS: 1.05, outcome.WITH_TERMS: MISMATCH if helps else 1.03}
+    ratios = {"as given": 1.0, standing.WITH_EFFECTS: 1.05, beside_terms.WITH_TERMS: MISMATCH if helps else 1.03}
     steps = [(name, predictor.steps(NOMINAL.with_effect("wheel-mismatch", ratio=one))) for name, one in ratios.items()]
     barred = []
-    monkeypatch.setattr(outcome, "_established", lambda *given: (barred.extend(given[4]), without)[1] if given[4:] else found)
-    monkeypatch.setattr(outcome, "_believable", lambda found, *_: found)
-    monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: paired_errors(predictor, steps))
+    monkeypatch.setattr(outcome, "sought_terms", lambda *given: (barred.extend(given[4]), without)[1] if given[4:] else found)
+    monkeypatch.setattr(outcome, "without_absurd", lambda found, *_: found)
+    monkeypatch.setattr(beside_terms, "_errors_with_terms", lambda *_: paired_errors(predictor, steps))
     ended = outcome.outcome_of(SelectionResult(problem, nominal, nominal, (), ()), predictor, NOMINAL, lambda _: None)
     assert ended.selection.accepted == (("wheel-mismatch",) if helps else ())
     assert barred == ([] if helps else ["wheel-mismatch"])

@@ -12,25 +12,23 @@ import bns.diagnose.diagnosis as said_by
 from bns.api.diagnose import DiagnoseResult
 from bns.cli.commands.diagnose import _which
 from bns.diagnose.caveats import (
-    _on_drift,
-    _on_effects,
     _on_reach,
     _on_rejected,
     _on_rest,
     _on_terms,
-    _on_times,
     _on_undescribed,
-    implausible_text,
     notes_on,
-    on_worst,
 )
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import Diagnosis, diagnose
+from bns.diagnose.diagnosing import diagnose
+from bns.diagnose.diagnosis import Diagnosis
+from bns.diagnose.effect_caveats import _on_drift, _on_times, implausible_text, on_effects
 from bns.diagnose.estimate.smoothing_tracker import SmoothingTracker
 from bns.diagnose.predict.paired_errors import Change, HorizonErrors, ModelError, PairedErrors
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.along_variables import ResidualDependence
 from bns.diagnose.residuals.unexplained import NOTHING, Unexplained
+from bns.diagnose.residuals.worst_in_words import on_worst
 from bns.diagnose.residuals.worst_trials import Apart, WithoutWorst
 from bns.physics.effects import all_effects, effect_named
 from tests.diagnose.worlds import NOMINAL, measured
@@ -187,7 +185,7 @@ def test_an_offset_of_the_marker_may_be_the_robots():
         accepted=("camera-scale", "marker-offset"), competing_models=(), steps=(), fit=SimpleNamespace(model=model, free=())
     )
     tracks = SimpleNamespace(extra={}, start_known=False, commands_at_poses_s=None, timed=False)
-    camera, marker = list(_on_effects(selection, tracks))[:2]
+    camera, marker = list(on_effects(selection, tracks))[:2]
     assert camera == "camera-scale is an error of the measurement, not of the robot."
     assert marker.startswith("marker-offset is an error of the measurement, or else one of the model of the robot: ")
 
@@ -198,24 +196,24 @@ def test_what_an_effect_takes_for_granted_is_said_also_where_it_seems_to_imitate
     accepted = () if imitating else ("backlash",)
     selection = SimpleNamespace(accepted=accepted, competing_models=(), steps=(), fit=SimpleNamespace(model=model, free=()))
     tracks = SimpleNamespace(extra={}, start_known=False, commands_at_poses_s=None, timed=False)
-    notes = list(_on_effects(selection, tracks, imitating))
+    notes = list(on_effects(selection, tracks, imitating))
     assert sum("the gears are assumed to touch in the forward direction" in note for note in notes) == 1
 
 
 @pytest.mark.parametrize(("accepted", "said"), [(("motor-lag",), 1), (("clock-offset",), 1), (("speed-gain",), 0)])
 def test_a_lag_is_said_to_be_perhaps_the_trackers(monkeypatch, accepted, said):
     found = SmoothingTracker(tau_s=0.1, z=5.0)
-    monkeypatch.setattr("bns.diagnose.caveats.smoothing_tracker", lambda problem, fit: found)
+    monkeypatch.setattr("bns.diagnose.effect_caveats.smoothing_tracker", lambda problem, fit: found)
     model = SimpleNamespace(per_trial_effect=None, effects=(), catalogue=all_effects)
     fit = SimpleNamespace(model=model, free=())
     selection = SimpleNamespace(accepted=accepted, competing_models=(), steps=(), problem=None, fit=fit)
     tracks = SimpleNamespace(extra={}, start_known=False, commands_at_poses_s=None, timed=False)
-    assert sum(note == found.in_words for note in _on_effects(selection, tracks)) == said
+    assert sum(note == found.in_words for note in on_effects(selection, tracks)) == said
 
 
 @pytest.mark.parametrize(("rate", "scatter_s", "said"), [(1e-4, 5e-3, True), (0.0, 5e-3, False), (1e-4, 0.5, False)])
 def test_clocks_that_move_along_the_session_are_said_to(monkeypatch, rate, scatter_s, said):
-    monkeypatch.setattr("bns.diagnose.caveats.known_effects", lambda _: {})
+    monkeypatch.setattr("bns.diagnose.effect_caveats.known_effects", lambda _: {})
     start_s = np.arange(40.0) * 35.0
     own_s = 0.02 + rate * start_s + scatter_s * np.random.default_rng(2).normal(size=40)
     notes = list(_on_drift("clock-offset", start_s, own_s))
@@ -224,7 +222,7 @@ def test_clocks_that_move_along_the_session_are_said_to(monkeypatch, rate, scatt
         assert re.search(r"by \+0\.3[4-8]\d* s per hour of the session .* differ by (9\d|10\d)(\.\d+)? parts in a mill", notes[0])
     for known in (True, False):  # else trials are taken to follow each other without a pause
         tracks = SimpleNamespace(extra={}, start_known=known, start_s=start_s, commands_at_poses_s=None)
-        assert sum("parts in a million" in note for note in _on_effects(with_clocks(own_s), tracks)) == (said and known)
+        assert sum("parts in a million" in note for note in on_effects(with_clocks(own_s), tracks)) == (said and known)
     assert list(_on_drift("clock-offset", start_s[:4], own_s[:4])) == []
     assert list(_on_drift("clock-offset", 0 * start_s, own_s)) == []
 
@@ -295,7 +293,7 @@ def test_so_many_more_trials_as_would_make_a_sign_certain_are_asked_for(z, more)
 
 def test_a_number_without_a_unit_is_written_without_one(monkeypatch):
     monkeypatch.setattr("bns.diagnose.caveats.known_effects", lambda _selection: {})
-    monkeypatch.setattr("bns.diagnose.caveats._on_moved", lambda _: ["What it moves."])
+    monkeypatch.setattr("bns.diagnose.caveats.on_moved", lambda _: ["What it moves."])
     selection = SimpleNamespace(
         implausible={}, accepted=(), competing_models=(), steps=(SimpleNamespace(ranking=()),),
         fit=SimpleNamespace(model=NOMINAL, free=()), nominal=SimpleNamespace(losses=np.ones(10)),
@@ -376,10 +374,10 @@ def test_of_a_tie_the_command_line_says_which_explanation_it_wrote(others, said)
 
 @pytest.mark.parametrize("together", [True, False])
 def test_numbers_that_are_only_known_together_are_said_to_be(monkeypatch, together):
-    monkeypatch.setattr("bns.diagnose.caveats.known_together", lambda fit, name: together and name == "backlash")
+    monkeypatch.setattr("bns.diagnose.effect_caveats.known_together", lambda fit, name: together and name == "backlash")
     model = SimpleNamespace(per_trial_effect=None, effects=(), catalogue=all_effects)
     fit = SimpleNamespace(model=model, free=())
     selection = SimpleNamespace(accepted=("backlash", "speed-gain"), competing_models=(), steps=(), fit=fit)
     tracks = SimpleNamespace(extra={}, start_known=False, commands_at_poses_s=None, timed=False)
-    said = [note for note in _on_effects(selection, tracks) if "only known together" in note]
+    said = [note for note in on_effects(selection, tracks) if "only known together" in note]
     assert [note.split(":")[0] for note in said] == (["backlash"] if together else [])

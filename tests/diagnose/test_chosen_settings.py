@@ -10,7 +10,7 @@ import bns
 from bns.cli.main import main
 from bns.diagnose.data import checks, spread, tracker_faults
 from bns.diagnose.data.bodies import joints
-from bns.diagnose.residuals import grammar
+from bns.diagnose.residuals import ranked_families as ranking
 from bns.diagnose.select import stepwise
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.settings.chosen import _TURNS, _lines, in_force, settings_of
@@ -82,9 +82,9 @@ def test_copies_of_a_setting_in_other_modules_follow_it():
     with in_force(other):
         assert (checks._JUMP_M, tracker_faults.LEAST_M) == (0.5, 0.5)
         assert stepwise.MIN_GAIN == 0.25
-        from bns.diagnose import diagnosis
+        from bns.diagnose import diagnosing
 
-        assert diagnosis.MIN_GAIN == 0.25
+        assert diagnosing.MIN_GAIN == 0.25
     assert before == (checks._JUMP_M, tracker_faults.LEAST_M, stepwise.MIN_GAIN)
 
 
@@ -92,12 +92,12 @@ def test_names_that_are_given_together_follow_their_settings():
     chosen = settings_of({
         "data": {"set_point_beyond": 0.7, "set_point_turns_rad": 9.0, "at_rest": [0.5, 0.25]}, "residuals": {"large_z": 7.0},
     })  # fmt: skip
-    before = joints._BEYOND, joints._TURNS_RAD, spread._FAR_M, spread._FAR_RAD, grammar.LARGE, grammar.LARGE_Z
+    before = joints._BEYOND, joints._TURNS_RAD, spread._FAR_M, spread._FAR_RAD, ranking.LARGE, ranking.LARGE_Z
     with in_force(chosen):
         assert (joints._BEYOND, joints._TURNS_RAD) == (0.7, 9.0)
         assert (spread._FAR_M, spread._FAR_RAD) == (0.5, 0.25)
-        assert (DEFAULTS.residuals.large, 7.0) == (grammar.LARGE, grammar.LARGE_Z)
-    assert before == (joints._BEYOND, joints._TURNS_RAD, spread._FAR_M, spread._FAR_RAD, grammar.LARGE, grammar.LARGE_Z)
+        assert (DEFAULTS.residuals.large, 7.0) == (ranking.LARGE, ranking.LARGE_Z)
+    assert before == (joints._BEYOND, joints._TURNS_RAD, spread._FAR_M, spread._FAR_RAD, ranking.LARGE, ranking.LARGE_Z)
 
 
 def test_an_error_puts_the_defaults_back():

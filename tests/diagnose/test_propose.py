@@ -37,7 +37,7 @@ from bns.diagnose.design.sequences import (
     short_durations,
     uniform,
 )
-from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.diagnosing import diagnose
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report.proposal_text import proposal_lines, proposal_text
@@ -182,7 +182,7 @@ def test_separation_is_what_a_real_refit_leaves(narrow):
     one = found[(0, 1)][0]
     # nothing known of the rival's numbers, all of the true ones
     free = replace(one, prior=1e-9 * np.eye(len(one.prior)), spread=np.zeros_like(one.spread))
-    from bns.diagnose.estimate.fit import Problem
+    from bns.diagnose.estimate.fitting import Problem
     from bns.diagnose.estimate.noise import filter_for
 
     predictor = noise_free_predictor(a.fit.model, planned_tracks(plan, ARENA.start, None, np.zeros(12)))

@@ -16,10 +16,10 @@ from bns.physics.model import load_model
 DIAGNOSE = Path(bns.__file__).parent / "diagnose"
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 NO_SETTINGS = {
-    ("residuals/grammar.py", "_SMALL"): "step of a difference quotient of a linear term",
+    ("residuals/ranked_families.py", "_SMALL"): "step of a difference quotient of a linear term",
     ("data/mapping.py", "UNITS"): "factors between units, by definition",
     ("data/robust.py", "_NORMAL"): "the median of a standard normal number's size",
-    ("estimate/fit.py", "_LATELY"): "the size of a cache: the answers are the same for any",
+    ("estimate/fitting.py", "_LATELY"): "the size of a cache: the answers are the same for any",
     ("predict/paired_errors.py", "_LATELY"): "the size of a cache: the answers are the same for any",
     ("parallel.py", "MOST"): "threads: the answers are the same for any number",
     ("predict/wheels.py", "_KEPT"): "the size of a cache: the answers are the same for any",
@@ -27,8 +27,8 @@ NO_SETTINGS = {
     ("report/people.py", "_UNITS"): "factors between units, by definition",
     ("residuals/floor_field.py", "_WIDE_M"): "wider than the floor that tents cover, so that all of them are meant",
     ("predict/stretches.py", "_RIMS"): "where a rim has the friction of the floor within 1 %: saves simulations alone",
-    ("residuals/words.py", "_WAYS"): "a metre, driven lately and before: where a curve is put in words",
-    ("residuals/words.py", "_POINTS"): "points at which a curve is evaluated to be put in words",
+    ("residuals/past_in_words.py", "_WAYS"): "a metre, driven lately and before: where a curve is put in words",
+    ("residuals/phrases.py", "POINTS"): "points at which a curve is evaluated to be put in words",
 }
 """Numbers that stand in a module, and why they decide nothing that could be decided otherwise."""
 

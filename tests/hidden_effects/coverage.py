@@ -19,7 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from bns.diagnose.data.load import load_measured
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.jagged import with_jagged
 from bns.diagnose.estimate.problem import problem_for, problem_with_noise
 from bns.diagnose.estimate.starts import listed

@@ -24,7 +24,8 @@ from bns.diagnose.design.limits import arena_of, bounds_of
 from bns.diagnose.design.power import distinguished
 from bns.diagnose.design.proposal import propose
 from bns.diagnose.design.sequences import Arena, Bounds, Sequences, draw_sequences, uniform
-from bns.diagnose.diagnosis import Diagnosis, diagnose
+from bns.diagnose.diagnosing import diagnose
+from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.significance import paired_elpd_diff
 from bns.diagnose.predict.wheels import WheelPredictor

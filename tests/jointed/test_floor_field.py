@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.diagnose import outcome
-from bns.diagnose.estimate.fit import Problem
+from bns.diagnose import standing
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.predict.jointed import JointedPredictor
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.floor_field import imitating_floor
@@ -64,29 +64,29 @@ def test_a_real_effect_stays_with_and_without_a_rough_place(effect, rough):
 
 
 def test_wheels_have_no_field_and_are_not_asked(monkeypatch):
-    monkeypatch.setattr(outcome, "imitating_floor", None)
+    monkeypatch.setattr(standing, "imitating_floor", None)
     stands = SimpleNamespace(selection=None, rest=SimpleNamespace(any=True))
     wheels = object.__new__(WheelPredictor)
-    assert outcome._beside_the_floor(stands, wheels, None, None) == (stands, ())
+    assert standing.beside_the_floor(stands, wheels, None, None) == (stands, ())
 
 
 def test_an_explanation_without_what_imitates_takes_its_place(monkeypatch):
     problem, fit = problem_of(link_is_place=True)
     bare = problem.fit(SNAKE)
     patch = (1.0, 0.0, 0.5, 2.0)
-    monkeypatch.setattr(outcome, "fit_with", lambda problem, fit, effect, known: problem.fit(known, rounds=0))
+    monkeypatch.setattr(standing, "fit_with", lambda problem, fit, effect, known: problem.fit(known, rounds=0))
     found = SimpleNamespace(model=SNAKE.with_active(SNAKE.effect_named("floor-patch"), patch))
     step = SelectionStep((Candidate("floor-patch", found, None),), 0.0, LINK)
     selection = SelectionResult(problem, bare, fit, (LINK,), (step,), (("floor-patch",),))
     monkeypatch.setattr(SelectionResult, "only", lambda self, names: SelectionResult(problem, bare, bare, names, self.steps))
-    monkeypatch.setattr(outcome, "_standing", lambda selection, *_: selection)
+    monkeypatch.setattr(standing, "standing_of", lambda selection, *_: selection)
     stands = SimpleNamespace(selection=selection, rest=SimpleNamespace(any=True))
-    other, lost = outcome._beside_the_floor(stands, problem.predictor, SNAKE, lambda _: None)
+    other, lost = standing.beside_the_floor(stands, problem.predictor, SNAKE, lambda _: None)
     assert lost == (LINK,)
     assert other.accepted == ("floor-patch",)
     assert tuple(other.fit.model.values_of("floor-patch").values()) == patch
     nothing = SelectionResult(problem, bare, fit, (LINK,), (step,))
     stands = SimpleNamespace(selection=nothing, rest=SimpleNamespace(any=True))
-    assert outcome._beside_the_floor(stands, problem.predictor, SNAKE, lambda _: None)[0].accepted == ()
+    assert standing.beside_the_floor(stands, problem.predictor, SNAKE, lambda _: None)[0].accepted == ()
     stands = SimpleNamespace(selection=selection, rest=SimpleNamespace(any=False))
-    assert outcome._beside_the_floor(stands, problem.predictor, SNAKE, None) == (stands, ())
+    assert standing.beside_the_floor(stands, problem.predictor, SNAKE, None) == (stands, ())

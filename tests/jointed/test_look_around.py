@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.diagnose.estimate.fit import Problem, _Point
+from bns.diagnose.estimate.fitting import Problem, _Point
 from bns.diagnose.estimate.look_around import lower_place
 from bns.diagnose.estimate.parameters import FreeParameter
 from bns.physics.jointed.model_files import load_body

@@ -6,7 +6,7 @@ import pytest
 
 import bns
 from bns.api.model import as_model
-from bns.diagnose.caveats import _on_the_cone
+from bns.diagnose.effect_caveats import on_the_cone
 from bns.errors import DataError
 from bns.physics.jointed.drives import Drive
 from bns.physics.jointed.mechanism import Mechanism, machine
@@ -53,9 +53,9 @@ def test_a_pyramid_of_friction_is_pointed_out_where_a_body_lies_on_a_floor(tmp_p
     default.write_text(dog.xml().replace('cone="elliptic" ', ""))
     (tmp_path / "arm.xml").write_text(arm.xml())
     of_default = load_body(str(default), sites=list(dog.SITES))
-    assert 'Set <option cone="elliptic"/>' in next(_on_the_cone(of_default))
+    assert 'Set <option cone="elliptic"/>' in next(on_the_cone(of_default))
     for model in (body, load_body(str(tmp_path / "arm.xml")), as_model("khepera")):
-        assert list(_on_the_cone(model)) == []
+        assert list(on_the_cone(model)) == []
 
 
 def test_of_two_that_touch_the_one_with_priority_counts(body):

@@ -5,11 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.diagnose import diagnosis
-from bns.diagnose.estimate.fit import Problem
+from bns.diagnose import diagnosing
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.noise import gathered, huber, length
 from bns.diagnose.predict.responses import Responses
-from bns.diagnose.select import screening, stepwise
+from bns.diagnose.select import forwards, screening
+from bns.diagnose.select.forwards import Forwards
 from bns.diagnose.select.result import Candidate, SelectionStep
 from bns.physics.effect import Effect, Parameter
 from bns.physics.jointed.model_files import load_body
@@ -142,26 +143,26 @@ def test_effects_are_screened_well_inside_of_what_is_plausible_and_where_robots_
 @pytest.mark.parametrize("far", [0.2, 0.9])
 def test_what_comes_near_the_best_is_worked_out_before_it_is_compared(monkeypatch, far):
     asked = []
-    search = stepwise.StepwiseSelection.__new__(stepwise.StepwiseSelection)
-    search.predictor = SimpleNamespace(anchor=lambda model: asked.append(model) or True, counted=None)
-    monkeypatch.setattr(stepwise, "Problem", lambda *_: SimpleNamespace(fit=lambda model: SimpleNamespace(loss=1.0, model=model)))
-    search._candidate = lambda _problem, _fit, added, name: Candidate(name, added, None)
+    search = Forwards.__new__(Forwards)
+    search._predictor = SimpleNamespace(anchor=lambda model: asked.append(model) or True, counted=None)
+    monkeypatch.setattr(forwards, "Problem", lambda *_: SimpleNamespace(fit=lambda model: SimpleNamespace(loss=1.0, model=model)))
+    search._acceptance = SimpleNamespace(candidate=lambda _problem, _fit, added, name: Candidate(name, added, None))
     rough = [Candidate(name, SimpleNamespace(loss=loss, model=name), None) for name, loss in (("a", 10.0), ("b", 100 - 90 * far))]
     out = search._worked_out(SimpleNamespace(pose_filter=None), SimpleNamespace(loss=100.0), rough)
-    assert asked == (["a", "b"] if far > stepwise.BEHIND else ["a"])
-    assert [c.fit.loss for c in out] == ([1.0, 1.0] if far > stepwise.BEHIND else [1.0, 100 - 90 * far])
+    assert asked == (["a", "b"] if far > forwards.BEHIND else ["a"])
+    assert [c.fit.loss for c in out] == ([1.0, 1.0] if far > forwards.BEHIND else [1.0, 100 - 90 * far])
 
 
 def test_where_nothing_lowers_the_loss_nothing_is_worked_out():
-    search = stepwise.StepwiseSelection.__new__(stepwise.StepwiseSelection)
-    search.predictor = SimpleNamespace(anchor=lambda _model: pytest.fail("worked out"))
+    search = Forwards.__new__(Forwards)
+    search._predictor = SimpleNamespace(anchor=lambda _model: pytest.fail("worked out"))
     rough = [Candidate(name, SimpleNamespace(loss=loss, model=name), None) for name, loss in (("a", 100.0), ("b", 101.0))]
     assert search._worked_out(None, SimpleNamespace(loss=100.0), rough) == rough
 
 
 def test_a_step_of_the_search_compares_what_was_worked_out(monkeypatch):
-    search = stepwise.StepwiseSelection.__new__(stepwise.StepwiseSelection)
-    search.predictor, search.catalogue = SimpleNamespace(screening=64), dict.fromkeys("abcde")
+    search = Forwards.__new__(Forwards)
+    search._predictor, search._catalogue = SimpleNamespace(screening=64), dict.fromkeys("abcde")
     search._worth = {}
     gain = {"a": 100.0, "b": 90.0}
 
@@ -170,7 +171,7 @@ def test_a_step_of_the_search_compares_what_was_worked_out(monkeypatch):
 
     monkeypatch.setattr(search, "_worth_a_fit", lambda *_: list(gain), raising=False)
     monkeypatch.setattr(search, "_tried", lambda *given: candidate(given[-1], gain.get(given[-1], 0.0)), raising=False)
-    monkeypatch.setattr(search, "_earned", lambda *_: False, raising=False)
+    search._acceptance = SimpleNamespace(earned=lambda *_: False)
     well = {"a": 50.0, "b": 95.0}
     monkeypatch.setattr(search, "_worked_out", lambda _problem, _fit, tried: [candidate(c.name, well[c.name]) for c in tried])
     step, _, _ = search._forward_step(None, SimpleNamespace(model=SNAKE), ())
@@ -257,5 +258,5 @@ def test_a_sign_of_too_few_trials_is_judged_by_all_effects_that_were_screened(of
     candidate = SimpleNamespace(name="clock-drift", rejected_because="", paired_comparison=earned)
     step = SelectionStep((candidate, candidate), 0.1, "", of=of_how_many)
     found = SimpleNamespace(accepted=(), steps=(step,), nominal=SimpleNamespace(losses=np.ones(9)))
-    assert (diagnosis._hint(found, 9) is candidate) is hinted
-    assert diagnosis._hint(found, 9, {"clock-drift"}) is None  # said to lower no error: more trials are not asked for, too
+    assert (diagnosing._hint(found, 9) is candidate) is hinted
+    assert diagnosing._hint(found, 9, {"clock-drift"}) is None  # said to lower no error: more trials are not asked for, too

@@ -5,7 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.diagnose.estimate.fit import Fit, Problem, _Point
+from bns.diagnose.estimate.chords import chords
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem, _Point
 from bns.diagnose.estimate.parameters import FreeParameter, increments
 from bns.physics.effects import effect_named
 from bns.physics.jointed.model_files import load_body
@@ -29,7 +31,7 @@ def test_a_chord_is_the_change_from_neutral_and_at_neutral_the_slope(gain, colum
     fit = SimpleNamespace(
         model=model, free=free, values=np.array([gain]), whitened=saturated(model), jacobian=np.zeros((2, 3, 1))
     )
-    np.testing.assert_allclose(problem._chords(fit, [0])[..., 0], column, atol=1e-12)
+    np.testing.assert_allclose(chords(problem.whitened, fit, [0])[..., 0], column, atol=1e-12)
 
 
 def stepped(model):

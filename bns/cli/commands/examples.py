@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from bns.cli.commands.diagnose import Adder
 from bns.cli.options.option_types import as_json
+from bns.cli.parser import Adder
 
 
 def add_commands(command: Adder) -> None:

@@ -6,7 +6,8 @@ import argparse
 import logging
 from pathlib import Path
 
-from bns.cli.commands.diagnose import Adder, model_of
+from bns.cli.options.measuring_options import model_of
+from bns.cli.parser import Adder
 
 LARGEST_PORT = 65_535
 

@@ -8,16 +8,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from bns.cli.commands.diagnose import (
-    MINUTES,
-    Adder,
-    add_effect_options,
-    add_model_options,
-    diagnosed,
-    refuse_sources,
-    ticking,
-    words_of,
-)
+from bns.cli.commands.diagnose import diagnosed
+from bns.cli.options.measuring_options import MINUTES, add_effect_options, add_model_options, refuse_sources, words_of
+from bns.cli.parser import Adder
+from bns.cli.progress_bar import ticking
 
 
 def add_commands(command: Adder) -> None:

@@ -7,9 +7,8 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
-from bns.cli.commands.diagnose import Adder
 from bns.cli.options.option_types import as_json, interval
-from bns.cli.parser import add_results
+from bns.cli.parser import Adder, add_results
 
 
 def add_commands(command: Adder) -> None:

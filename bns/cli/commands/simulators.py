@@ -6,9 +6,8 @@ import argparse
 import time
 from pathlib import Path
 
-from bns.cli.commands.diagnose import Adder
 from bns.cli.options.option_types import positive
-from bns.cli.parser import add_results
+from bns.cli.parser import Adder, add_results
 
 
 def add_commands(command: Adder) -> None:

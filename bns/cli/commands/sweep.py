@@ -6,11 +6,10 @@ import argparse
 import sys
 from dataclasses import asdict
 
-from bns.cli.commands.diagnose import Adder
 from bns.cli.compiling import say_if_compiling
 from bns.cli.options.option_types import as_json, duration, positive
 from bns.cli.options.sweep_options import add_cluster_options, backend_name, request_of, say_if_experimental
-from bns.cli.parser import add_results, add_trust
+from bns.cli.parser import Adder, add_results, add_trust
 from bns.errors import SpecError
 from bns.spec import RunSpec
 

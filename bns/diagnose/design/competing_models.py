@@ -9,7 +9,8 @@ from typing import Any
 
 from bns.diagnose.design.planned import delays_of
 from bns.diagnose.diagnosis import Diagnosis
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.predict.wheels import WheelPredictor

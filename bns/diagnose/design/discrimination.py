@@ -24,7 +24,8 @@ from bns.diagnose.data.tracks import Array
 from bns.diagnose.design.competing_models import CompetingModel
 from bns.diagnose.design.planned import delays_of, noise_free_predictor, planned_tracks
 from bns.diagnose.design.sequences import Arena, Sequences
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.noise import huber
 from bns.diagnose.estimate.problem import problem_with_noise
 from bns.diagnose.estimate.pseudo_inverse import pseudo_inverse

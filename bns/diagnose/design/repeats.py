@@ -20,7 +20,7 @@ from bns.diagnose.design.competing_models import CompetingModel
 from bns.diagnose.design.discrimination import Discrimination, Pair, curvature_of, whitened_errors
 from bns.diagnose.design.power import PastTrials
 from bns.diagnose.design.search import Pool, select_trials
-from bns.diagnose.estimate.fit import Problem
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.noise import huber
 from bns.diagnose.estimate.normal_equations import normal_equations_by_trial
 from bns.diagnose.settings import DEFAULTS

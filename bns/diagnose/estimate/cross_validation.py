@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.estimate.clocks.trial_clock_test import steps_of
-from bns.diagnose.estimate.fit import Problem
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.noise import Whitening
 from bns.diagnose.parallel import each
 from bns.diagnose.predict.base import Predictor, Steps

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from functools import partial
 
 from bns.diagnose.data.tracks import Array
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.jagged import with_jagged
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.profiles import with_simulated_profiles

@@ -14,7 +14,8 @@ from functools import lru_cache
 import numpy as np
 
 from bns.diagnose.data.tracks import Array
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.noise import huber
 from bns.diagnose.estimate.parameters import increment, moved_by
 from bns.diagnose.estimate.pseudo_inverse import pseudo_inverse

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from bns.diagnose.data.tracks import Array
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.normal_equations import normal_equations
 from bns.diagnose.estimate.parameters import moved_by
 from bns.diagnose.estimate.problem import problem_for

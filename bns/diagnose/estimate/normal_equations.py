@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.noise import weights
+from bns.diagnose.estimate.pseudo_inverse import pseudo_inverse
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,20 @@ def normal_equations_by_trial(first: NDArray[np.int64], jacobian: Array, whitene
         part = _flat(weighted[a:b]).T
         gradients[trial], curvatures[trial] = part @ whitened[a:b].ravel(), part @ _flat(jacobian[a:b])
     return NormalEquations(gradients, curvatures)
+
+
+def damped_step(curvature: Array, gradient: Array, damping: float) -> Array:
+    """The step of least squares, shortened by so much of the curvature's diagonal."""
+    if not len(gradient):
+        return np.zeros(0)
+    scale = np.diag(curvature).copy()
+    scale[scale <= 0] = 1.0
+    return np.asarray(-pseudo_inverse(curvature + damping * np.diag(scale)) @ gradient, dtype=np.float64)
+
+
+def predicted_decrease_of(step: Array, curvature: Array, gradient: Array) -> float:
+    """By how much a step lowers the loss, by the gradient and the curvature."""
+    return float(-(gradient @ step) - step @ curvature @ step / 2)
 
 
 def innovations_after(first: NDArray[np.int64], jacobian: Array, whitened: Array, steps: Array) -> Array:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.clocks.trial_clock_test import steps_of
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.noise import estimate_noise, filter_for
 from bns.diagnose.estimate.stretch_noise import estimate_stretch_noise, stretch_filter
 from bns.diagnose.predict.base import Predictor, Steps

@@ -16,7 +16,8 @@ import numpy as np
 from scipy.special import stdtrit
 
 from bns.diagnose.data.tracks import Array
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.jagged import followed
 from bns.diagnose.estimate.noise import huber
 from bns.diagnose.estimate.parameters import FreeParameter, moved_by

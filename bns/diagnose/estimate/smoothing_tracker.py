@@ -14,7 +14,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from bns.diagnose.data.tracks import Array
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.noise import huber
 from bns.diagnose.estimate.significance import MIN_Z, paired_elpd_diff
 from bns.diagnose.predict.wheels import WheelPredictor

@@ -10,7 +10,8 @@ from math import prod
 import numpy as np
 
 from bns.diagnose.data.tracks import Tracks
-from bns.diagnose.estimate.fit import Fit, Problem, StartingPoint
+from bns.diagnose.estimate.fit import Fit, StartingPoint
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.look_around import lower_place
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.wheels import WheelPredictor

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from bns.diagnose.adding import ExtendedModel
-from bns.diagnose.caveats import implausible_text
 from bns.diagnose.comparison import Comparison
 from bns.diagnose.data.checks import Finding
 from bns.diagnose.design.competing_models import Rival
 from bns.diagnose.diagnosis import Diagnosis
+from bns.diagnose.effect_caveats import implausible_text
 from bns.diagnose.estimate.calibration import wheel_sizes
 from bns.diagnose.estimate.plausibility import with_unit
 from bns.diagnose.predict.paired_errors import Change, PairedErrors

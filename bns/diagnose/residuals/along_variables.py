@@ -14,7 +14,8 @@ import numpy as np
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.data.variables import bare, label, velocity
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.noise import huber
 from bns.diagnose.estimate.normal_equations import NormalEquations, innovations_after, normal_equations
 from bns.diagnose.estimate.parameters import active_mask

@@ -16,7 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bns.diagnose.data.tracks import Array, Tracks
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.noise import huber, weights
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.delays_follow import Changes, DelayRule, delay_rule

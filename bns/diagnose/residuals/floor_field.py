@@ -10,11 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from bns.diagnose.data.tracks import Array
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.significance import paired_elpd_diff
 from bns.diagnose.predict.jointed import JointedPredictor
 from bns.diagnose.residuals.along_variables import CHANCE, with_columns
-from bns.diagnose.residuals.grammar import certain
+from bns.diagnose.residuals.ranked_families import certain
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.jointed.pieced import Piece, PiecedEffect
 

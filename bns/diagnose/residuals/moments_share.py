@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.data.tracks import Array, Tracks
-from bns.diagnose.estimate.fit import Problem
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.outliers import WIDTH, JudgedWindows
 from bns.diagnose.settings import DEFAULTS

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from bns.diagnose.data.robust import robust_sd
 from bns.diagnose.data.tracks import Array, Tracks
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.residuals.unforeseen import unforeseen_way, ways
 from bns.diagnose.settings import DEFAULTS
 

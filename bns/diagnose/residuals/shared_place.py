@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bns.diagnose.data.tracks import Array
-from bns.diagnose.estimate.fit import Problem
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.residuals.outliers import JudgedWindows, worst_of_trials
 from bns.diagnose.settings import DEFAULTS
 

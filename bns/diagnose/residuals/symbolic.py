@@ -14,7 +14,8 @@ from itertools import count, product
 
 import numpy as np
 
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.noise import weights
 from bns.diagnose.estimate.significance import PairedComparison
 from bns.diagnose.parallel import each

@@ -17,8 +17,9 @@ from bns.diagnose.data.tracks import Array
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.grammar import SURFACE
+from bns.diagnose.residuals.phrases import VELOCITIES, seconds
 from bns.diagnose.residuals.symbolic import Formula
-from bns.diagnose.residuals.words import VELOCITIES, driven, in_words, seconds, variables_of
+from bns.diagnose.residuals.words import driven, in_words, variables_of
 from bns.diagnose.settings import DEFAULTS
 from bns.engine.pose_filter import displacements
 from bns.physics.formula import LEFT, RIGHT, SHARE, WHEELS, names_in, value_of

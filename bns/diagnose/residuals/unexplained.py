@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.residuals.along_variables import ResidualDependence, significant_dependence
 from bns.diagnose.residuals.autocorrelation import Autocorrelation, autocorrelations
 from bns.diagnose.residuals.command_times import CommandTimes, command_times

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.data.tracks import Array
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.engine.pose_filter import displacements
 
 

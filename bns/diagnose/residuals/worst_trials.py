@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.data.robust import robust_sd
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.noise import huber
 from bns.diagnose.residuals.outliers import WIDTH, Outlier, moment_at
 from bns.diagnose.settings import DEFAULTS

@@ -14,7 +14,8 @@ from itertools import combinations
 import numpy as np
 
 from bns.diagnose.data.tracks import Array
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.noise import weights
 from bns.diagnose.estimate.plausibility import implausible
 from bns.diagnose.parallel import each

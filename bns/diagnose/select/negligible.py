@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bns.diagnose.estimate.cross_validation import held_out_steps
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.lacking import fit_without
 from bns.diagnose.estimate.parameters import FreeParameter
 from bns.diagnose.predict.paired_errors import HorizonErrors, PairedErrors, paired_errors

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bns.diagnose.estimate.cross_validation import held_out_steps
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.plausibility import implausible
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.significance import PairedComparison

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bns.diagnose.data.tracks import Array
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.problem import problem_with_noise
 from bns.diagnose.estimate.pseudo_inverse import pseudo_inverse
 from bns.diagnose.estimate.significance import chance

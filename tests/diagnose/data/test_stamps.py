@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bns.diagnose.caveats import _on_stamps
 from bns.diagnose.data.checks import checked
 from bns.diagnose.data.load import measured_table
 from bns.diagnose.data.stamps import stamp_scatter
 from bns.diagnose.data.tracker_faults import jumps
 from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.effect_caveats import _on_stamps
 
 STEP_S, LONG_S, NOISE_M = 0.001, 20.0, 0.001
 

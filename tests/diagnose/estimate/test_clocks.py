@@ -8,9 +8,9 @@ import pandas as pd
 import pytest
 
 from bns.cli.main import main
-from bns.diagnose import diagnosis
+from bns.diagnose import diagnosing
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.diagnosing import diagnose
 from bns.diagnose.estimate.clocks.trial_clock_test import every_other_block, fit_trial_clocks, with_trial_clocks
 from bns.diagnose.estimate.clocks.trial_clocks import eliminate_clocks, with_fitted_clocks
 from bns.diagnose.estimate.noise import weights
@@ -59,7 +59,7 @@ def test_beside_something_left_clocks_stand_only_if_the_error_is_lower_at_every_
     """With mocked searches: with clocks the errors are 1 mm over a command and ``one_s`` over 1 s, with a term 2 and 2 mm."""
     asked = []
 
-    class Search(diagnosis.StepwiseSelection):
+    class Search(diagnosing.StepwiseSelection):
         def run(self, before=None):
             asked.append(self._own_clocks)
             return self._own_clocks
@@ -77,17 +77,17 @@ def test_beside_something_left_clocks_stand_only_if_the_error_is_lower_at_every_
         none |= {name: {} for name in ("negligible", "beside_negligible", "kept_for", "seen_in_heading")}
         return Outcome(**{**unknown, **given, **none})
 
-    monkeypatch.setattr(diagnosis, "StepwiseSelection", Search)
-    monkeypatch.setattr(diagnosis, "outcome_of", ended)
-    monkeypatch.setattr(diagnosis, "_from_better_numbers", lambda selection, _: selection)
-    monkeypatch.setattr(diagnosis, "_longer", lambda *_: [])
-    monkeypatch.setattr(diagnosis, "_hint", lambda *_: None)
-    monkeypatch.setattr(diagnosis, "_verdict", lambda *_: "unlisted")
-    monkeypatch.setattr(diagnosis, "notes_on", lambda *_: [])
-    monkeypatch.setattr(diagnosis, "listed", lambda *_: {})
-    monkeypatch.setattr(diagnosis, "calibrated", lambda *_: None)
+    monkeypatch.setattr(diagnosing, "StepwiseSelection", Search)
+    monkeypatch.setattr(diagnosing, "outcome_of", ended)
+    monkeypatch.setattr(diagnosing, "_from_better_numbers", lambda selection, _: selection)
+    monkeypatch.setattr(diagnosing, "_longer", lambda *_: [])
+    monkeypatch.setattr(diagnosing, "_hint", lambda *_: None)
+    monkeypatch.setattr(diagnosing, "_verdict", lambda *_: "unlisted")
+    monkeypatch.setattr(diagnosing, "notes_on", lambda *_: [])
+    monkeypatch.setattr(diagnosing, "listed", lambda *_: {})
+    monkeypatch.setattr(diagnosing, "calibrated", lambda *_: None)
     plain = WheelPredictor(tracks_of(measured(NOMINAL)))
-    found = diagnosis._diagnosed(plain, NOMINAL, None, lambda _: None, (), lambda _: None)
+    found = diagnosing._diagnosed(plain, NOMINAL, None, lambda _: None, (), lambda _: None)
     assert (found.selection.fit.model.per_trial_effect is not None) is kept
     assert asked == ([True, False] if left else [True])
 

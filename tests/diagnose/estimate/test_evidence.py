@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.estimate import fit as fit_module
-from bns.diagnose.estimate import starts
-from bns.diagnose.estimate.fit import Problem
+from bns.diagnose.estimate import fitting, starts
+from bns.diagnose.estimate.chords import reaching
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.noise import estimate_noise
+from bns.diagnose.estimate.parameters import FreeParameter
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.significance import FLIPS, fewest_trials, paired_elpd_diff, sign_flip_p
 from bns.diagnose.predict.wheels import WheelPredictor
@@ -156,7 +157,7 @@ def test_the_noise_of_tracking_is_taken_from_the_tracks_where_they_tell_it():
 @pytest.mark.parametrize(("ruling", "flatter"), [(3.1, True), (2.9, False)])
 def test_where_one_trial_rules_a_slope_each_trial_has_the_one_of_its_flatter_side(ruling, flatter):
     """Three trials of one frame each; the last has more or less than nine tenths of the sum of squares."""
-    one = fit_module.FreeParameter("wheelbase", effect_named("wheelbase").parameters[0])
+    one = FreeParameter("wheelbase", effect_named("wheelbase").parameters[0])
     ahead, back = (np.array([[a, 0.0, 0.0], [0.0, b, 0.0], [0.0, 0.0, c]]) for a, b, c in ((0.7, 0.7, ruling), (0.6, 0.8, 0.1)))
     problem = Problem.__new__(Problem)
     problem.predictor = SimpleNamespace(luck=None, tracks=SimpleNamespace(first=np.arange(4)))
@@ -170,10 +171,10 @@ def test_where_one_trial_rules_a_slope_each_trial_has_the_one_of_its_flatter_sid
 
 
 def test_of_wide_slopes_to_both_sides_the_flatter_one_counts(monkeypatch):
-    one = fit_module.FreeParameter("wheelbase", effect_named("wheelbase").parameters[0])
+    one = FreeParameter("wheelbase", effect_named("wheelbase").parameters[0])
     at = SimpleNamespace(model=hidden(wheelbase={"factor": 1.0}), whitened=np.zeros((2, 3)))
     problem, flat = Problem.__new__(Problem), np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
-    monkeypatch.setattr(fit_module, "increments", lambda *_: [0.1, -0.1, 0.2])
+    monkeypatch.setattr(fitting, "increments", lambda *_: [0.1, -0.1, 0.2])
     problem._slope = lambda _at, _free, _j, by: {0.1: 3.0, -0.1: 1.0, 0.2: -2.0}[by] * flat
     np.testing.assert_array_equal(problem._jacobian(at, [one], wide=True).jacobian[..., 0], flat)
 
@@ -184,7 +185,7 @@ def test_the_way_to_a_fit_takes_the_place_of_the_direction_most_like_it():
     way = np.array([[0.2, 1.0, 0.1]])
     expected = columns.copy()
     expected[..., 1] = way
-    np.testing.assert_array_equal(fit_module._reaching(way, columns), expected)
+    np.testing.assert_array_equal(reaching(way, columns), expected)
     assert columns[0, 1, 1] == -0.1, "the columns given stay as they are"
 
 

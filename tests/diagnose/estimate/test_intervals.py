@@ -9,6 +9,7 @@ import pytest
 from bns.diagnose.data.checks import checked
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.estimate import fit_set as fit_set_module
+from bns.diagnose.estimate.chords import chords
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.jagged import _drawn, _middle_of_least, _searched, with_jagged
@@ -85,7 +86,7 @@ def test_a_limit_that_nothing_reaches_has_come_no_way():
     """Infinity less infinity is no number, and said so."""
     problem = problem_for(predictor_of(NOMINAL, trials=3), NOMINAL)
     added = problem.fit(NOMINAL.with_effect("command-timeout", timeout_s=float("inf")))
-    assert not problem._chords(added, [0]).any()
+    assert not chords(problem.whitened, added, [0]).any()
 
 
 def test_a_slope_that_spans_a_step_does_not_narrow_the_interval():

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from bns.diagnose.estimate.fit import FreeParameter
+from bns.diagnose.estimate.parameters import FreeParameter
 from bns.diagnose.estimate.plausibility import believable, fitted_again, implausible, limiting, undetermined
 from bns.physics.effect import Parameter
 from tests.diagnose.worlds import NOMINAL

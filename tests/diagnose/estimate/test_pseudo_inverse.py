@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 
 from bns.diagnose.adding import warnings_on
-from bns.diagnose.caveats import _on_numbers
 from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.effect_caveats import _on_numbers
 from bns.diagnose.estimate.cross_validation import judged_errors
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.plausibility import does_nothing, known_together

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import diagnose
-from bns.diagnose.estimate.fit import FreeParameter
+from bns.diagnose.diagnosing import diagnose
+from bns.diagnose.estimate.parameters import FreeParameter
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.single_wheel import single_wheel
 from bns.diagnose.predict.wheels import WheelPredictor

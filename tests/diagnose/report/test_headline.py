@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.diagnosing import diagnose
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report.plain_language import further_notes, head_of_page, headline, with_what

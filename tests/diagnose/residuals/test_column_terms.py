@@ -8,16 +8,8 @@ import bns
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.residuals.grammar import (
-    LOGGED,
-    LOGGED_OFFSET,
-    Family,
-    families,
-    formula_columns,
-    ranked,
-    significant,
-    simpler_first,
-)
+from bns.diagnose.residuals.grammar import LOGGED, LOGGED_OFFSET, Family, families, formula_columns
+from bns.diagnose.residuals.ranked_families import ranked, significant, simpler_first
 from bns.diagnose.residuals.symbolic import fitted
 from bns.diagnose.residuals.words import in_words
 from bns.physics.formula import formula_effect

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.diagnosing import diagnose
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report.text import diagnosis_text

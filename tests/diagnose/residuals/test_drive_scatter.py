@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.diagnose import diagnosis
+from bns.diagnose import diagnosing
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.drive_scatter import scatter_in_words, wandering_m
@@ -108,9 +108,9 @@ def scattered(table, rng):
 @pytest.mark.parametrize("verdict", ["", "insufficient-data"])
 def test_a_diagnosis_that_finds_nothing_says_so_and_one_that_cannot_tell_does_not(verdict, monkeypatch):
     if verdict:
-        monkeypatch.setattr(diagnosis, "_verdict", lambda *_: verdict)
+        monkeypatch.setattr(diagnosing, "_verdict", lambda *_: verdict)
     driven = measured(NOMINAL, trials=24, seed=5, noise=(0.0, 0.0), jitter=0.0, commands=12)
-    found = diagnosis.diagnose(WheelPredictor(tracks_of(scattered(driven, np.random.default_rng(1)))), NOMINAL)
+    found = diagnosing.diagnose(WheelPredictor(tracks_of(scattered(driven, np.random.default_rng(1)))), NOMINAL)
     assert found.verdict == (verdict or "none")
     said = [note for note in found.notes if "drive itself scatters" in note]
     assert len(said) == (not verdict)

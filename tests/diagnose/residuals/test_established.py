@@ -10,20 +10,13 @@ import pytest
 
 from bns.api.diagnose import DiagnoseResult
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.diagnosing import diagnose
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report.text import diagnosis_text
-from bns.diagnose.residuals.established import (
-    _restored,
-    _State,
-    _step,
-    _without_idle_terms,
-    _without_needless_terms,
-    established,
-    left_over,
-)
+from bns.diagnose.residuals.earned_terms import left_over
+from bns.diagnose.residuals.established import _step, established
 from bns.diagnose.residuals.grammar import (
     CHANGES,
     CHANGES_ALONE,
@@ -37,10 +30,11 @@ from bns.diagnose.residuals.grammar import (
     SURFACE,
     families,
     may_join,
-    ranked,
-    rounding,
-    significant,
 )
+from bns.diagnose.residuals.pruned import without_idle_terms, without_needless_terms
+from bns.diagnose.residuals.ranked_families import ranked, rounding, significant
+from bns.diagnose.residuals.restored import restored
+from bns.diagnose.residuals.search_state import State
 from bns.diagnose.residuals.symbolic import fitted, free_name
 from bns.diagnose.residuals.words import in_words
 from bns.physics.formula import formula_effect
@@ -88,7 +82,7 @@ def test_a_curve_that_predicts_better_for_certain_comes_before_an_effect_that_im
     problem = problem_for(predictor, NOMINAL)
     left = {"speed-gain": listed(NOMINAL, None, predictor.tracks)["speed-gain"]}
     grammar = families(predictor, NOMINAL.wheelbase_m)
-    following = _step(predictor, _State(problem, problem.fit(NOMINAL)), left, grammar, 0.01, {})
+    following = _step(predictor, State(problem, problem.fit(NOMINAL)), left, grammar, 0.01, {})
     assert following.names == ()
     assert [term.signal for term in following.terms] == ["time in the trial"]
 
@@ -242,7 +236,7 @@ def test_a_floor_that_slows_turns_as_well_in_one_direction_is_described():
 def drawn_by_curves(predictor, *wanted):
     """A search that ended in terms of these families (signal, on), where no effect came in."""
     problem = problem_for(predictor, NOMINAL)
-    state = _State(problem, problem.fit(NOMINAL))
+    state = State(problem, problem.fit(NOMINAL))
     for number, one in enumerate(wanted, 1):
         family = next(f for f in families(predictor, NOMINAL.wheelbase_m) if (f.signal, f.on) == one)
         term = fitted(state.problem, state.fit, one[1], family.term, f"term-{number}", one[0])
@@ -254,10 +248,10 @@ def test_an_effect_that_does_what_a_curve_does_stands_in_its_place():
     predictor = predictor_of(hidden(dead_zone={"width_m_s": 0.02}))
     catalogue = listed(NOMINAL, None, predictor.tracks)
     state = drawn_by_curves(predictor, ("speed of each wheel", "wheels"))
-    ended = _restored(predictor, state, {name: catalogue[name] for name in ("wheelbase", "dead-zone")}, 0.01)
+    ended = restored(predictor, state, {name: catalogue[name] for name in ("wheelbase", "dead-zone")}, 0.01)
     assert (ended.names, ended.terms) == (("dead-zone",), ())
     assert ended.fit.values.tolist() == pytest.approx([0.02], abs=3e-4)
-    assert _restored(predictor, state, {"wheelbase": catalogue["wheelbase"]}, 0.01) is state
+    assert restored(predictor, state, {"wheelbase": catalogue["wheelbase"]}, 0.01) is state
 
 
 def test_several_effects_that_draw_one_curve_together_do_not():
@@ -267,7 +261,7 @@ def test_several_effects_that_draw_one_curve_together_do_not():
     catalogue = listed(NOMINAL, None, predictor.tracks)
     state = drawn_by_curves(predictor, ("speed of the left wheel", "left"))
     both = {name: catalogue[name] for name in ("wheel-mismatch", "dead-zone")}
-    assert _restored(predictor, state, both, 0.01) is state
+    assert restored(predictor, state, both, 0.01) is state
 
 
 def test_an_effect_that_leaves_metres_behind_does_not_stand_in_place_of_a_curve():
@@ -275,7 +269,7 @@ def test_an_effect_that_leaves_metres_behind_does_not_stand_in_place_of_a_curve(
     predictor = predictor_of(warming(-0.4, speed_gain={"gain": 0.8}))
     catalogue = listed(NOMINAL, None, predictor.tracks)
     state = drawn_by_curves(predictor, ("time in the trial", "share"))
-    assert _restored(predictor, state, {"speed-gain": catalogue["speed-gain"]}, 0.01) is state
+    assert restored(predictor, state, {"speed-gain": catalogue["speed-gain"]}, 0.01) is state
 
 
 @pytest.mark.parametrize("warm_up", [-0.05, -0.2])
@@ -283,7 +277,7 @@ def test_an_effect_stands_in_place_of_its_curve_beside_another_curve_that_stays(
     predictor = predictor_of(warming(warm_up, dead_zone={"width_m_s": 0.02}))
     catalogue = listed(NOMINAL, None, predictor.tracks)
     state = drawn_by_curves(predictor, *FOUND_TOGETHER)
-    ended = _restored(predictor, state, {"dead-zone": catalogue["dead-zone"]}, 0.01)
+    ended = restored(predictor, state, {"dead-zone": catalogue["dead-zone"]}, 0.01)
     assert (ended.names, [term.signal for term in ended.terms]) == (("dead-zone",), ["time in the trial"])
     low, high = ended.fit.interval([f.effect for f in ended.fit.free].index("dead-zone"))
     assert low < 0.02 < high
@@ -294,7 +288,7 @@ def test_a_curve_that_can_draw_an_effect_does_not_come_back_beside_it():
     predictor = predictor_of(warming(-0.05, dead_zone={"width_m_s": 0.02}))
     catalogue = listed(NOMINAL, None, predictor.tracks)
     state = drawn_by_curves(predictor, ("speed of each wheel", "wheels"))
-    ended = _restored(predictor, state, {"dead-zone": catalogue["dead-zone"]}, 0.01)
+    ended = restored(predictor, state, {"dead-zone": catalogue["dead-zone"]}, 0.01)
     assert (ended.names, ended.terms) == (("dead-zone",), ())
 
 
@@ -307,9 +301,9 @@ def test_effects_that_leave_something_do_not_replace_a_curve_that_leaves_nothing
     def leaves_something(_, fit):
         return effects_leave_something and "term-1" not in {active.effect.name for active in fit.model.effects}
 
-    monkeypatch.setattr("bns.diagnose.residuals.established._leaves_something", leaves_something)
+    monkeypatch.setattr("bns.diagnose.residuals.pruned._leaves_something", leaves_something)
     accepted = {"dead-zone": listed(NOMINAL, None, predictor.tracks)["dead-zone"]}
-    ended = _without_needless_terms(predictor, state, accepted, 0.01)
+    ended = without_needless_terms(predictor, state, accepted, 0.01)
     assert (ended.names, ended.terms == state.terms) == (((), True) if effects_leave_something else (("dead-zone",), False))
 
 
@@ -327,14 +321,14 @@ def test_a_term_that_is_idle_beside_later_ones_goes(monkeypatch):
     """Also where a step that leaves one trial out overshoots, so that held-out trials seem to gain by it."""
     predictor = predictor_of(warming(-0.2))
     state = drawn_by_curves(predictor, ("time in the trial", "share"), ("speed and turn", "s"))
-    ended = _without_idle_terms(predictor, state, 0.01)
+    ended = without_idle_terms(predictor, state, 0.01)
     assert [term.name for term in ended.terms] == ["term-1"]
-    assert _without_idle_terms(predictor, ended, 0.01) is ended
+    assert without_idle_terms(predictor, ended, 0.01) is ended
     certain = SimpleNamespace(elpd_diff=20.0, dse=2.0, p_value=1e-5, z=10.0)
-    monkeypatch.setattr("bns.diagnose.estimate.fit.Problem.paired_comparison", lambda *_: certain)
-    assert [term.name for term in _without_idle_terms(predictor, state, 0.01).terms] == ["term-1"]
+    monkeypatch.setattr("bns.diagnose.estimate.fitting.Problem.paired_comparison", lambda *_: certain)
+    assert [term.name for term in without_idle_terms(predictor, state, 0.01).terms] == ["term-1"]
     both = drawn_by_curves(predictor_of(warming(-0.2, dead_zone={"width_m_s": 0.02})), *FOUND_TOGETHER)
-    assert _without_idle_terms(both.problem.predictor, both, 0.01) is both
+    assert without_idle_terms(both.problem.predictor, both, 0.01) is both
 
 
 @pytest.mark.parametrize(

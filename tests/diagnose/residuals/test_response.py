@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lsim
 
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.diagnosing import diagnose
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals import grammar

@@ -6,13 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.diagnose.residuals import established as module
+from bns.diagnose.residuals import pruned as module
 from bns.diagnose.residuals.grammar import RESPONSE, RESPONSE_OF, WHEELS
 
 
 @dataclass(frozen=True)
 class Beside:
-    """What `_without_shifts` asks of a state; the loss of held-out trials is 100 each, of which a gain must be 0.001."""
+    """What `without_shifts` asks of a state; the loss of held-out trials is 100 each, of which a gain must be 0.001."""
 
     names: tuple[str, ...]
     terms: tuple[SimpleNamespace, ...]
@@ -26,9 +26,9 @@ class Beside:
 def left(monkeypatch, alone, signal):
     """The names that stay of those in ``alone``: name -> what it earns without terms, by the names that are still there."""
     monkeypatch.setattr(module, "fit_without", lambda *_: None)
-    monkeypatch.setattr(module, "_alone", lambda _predictor, _given, state: {n: alone(n, state.names) for n in state.names})
+    monkeypatch.setattr(module, "worth_alone", lambda _predictor, _given, state: {n: alone(n, state.names) for n in state.names})
     names = ("motor-lag", "command-delay", "clock-offset")
-    return module._without_shifts(None, None, Beside(names, (SimpleNamespace(signal=signal),))).names
+    return module.without_shifts(None, None, Beside(names, (SimpleNamespace(signal=signal),))).names
 
 
 def cancelling(name, _names):

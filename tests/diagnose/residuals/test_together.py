@@ -8,9 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bns.diagnose import outcome
+from bns.diagnose import beside_terms
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import Diagnosis, diagnose
+from bns.diagnose.diagnosing import diagnose
+from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report.page import _of_all_terms
@@ -282,9 +283,9 @@ def test_the_terms_of_an_outcome_are_marked(monkeypatch):
     one = fitted(problem, problem.fit(NOMINAL), "v", "k * v * abs(v)", "unlisted", "speed and turn")
     two = fitted(problem, one.fit, "w", "k * w * abs(w)", "unlisted-2", "speed and turn")
     found = Established((), (replace(one, fit=two.fit), two), problem, two.fit)
-    monkeypatch.setattr(outcome, "negligible_and_errors", lambda _: ((), "errors", {}))
-    monkeypatch.setattr(outcome, "below_noise", lambda errors, names: names[1:] if errors == "errors" else ())
-    ended = outcome._without_negligible(found, SelectionResult(problem, one.fit, one.fit, (), ()), predictor)
+    monkeypatch.setattr(beside_terms, "negligible_and_errors", lambda _: ((), "errors", {}))
+    monkeypatch.setattr(beside_terms, "below_noise", lambda errors, names: names[1:] if errors == "errors" else ())
+    ended = beside_terms._without_negligible(found, SelectionResult(problem, one.fit, one.fit, (), ()), predictor)
     assert [term.below_noise for term in ended.terms] == [False, True]
 
 

@@ -7,7 +7,8 @@ import pandas as pd
 import pytest
 
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import Diagnosis, diagnose
+from bns.diagnose.diagnosing import diagnose
+from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.significance import PairedComparison
 from bns.diagnose.predict.wheels import RECENT_S, WheelPredictor

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import diagnose
-from bns.diagnose.estimate.fit import FreeParameter
+from bns.diagnose.diagnosing import diagnose
+from bns.diagnose.estimate.parameters import FreeParameter
 from bns.diagnose.estimate.plausibility import limiting, undetermined
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import listed

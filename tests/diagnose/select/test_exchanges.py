@@ -5,8 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.diagnose.select import exchanges, stepwise
+from bns.diagnose.select import exchanges, forwards, look_back, stepwise
+from bns.diagnose.select.acceptance import MIN_GAIN, Acceptance
 from bns.diagnose.select.exchanges import BEHIND, BEHIND_LOSS, SCREEN, Entry, Exchanges
+from bns.diagnose.select.forwards import Forwards
+from bns.diagnose.select.look_back import LookBack
 from bns.diagnose.select.result import Candidate
 from bns.diagnose.select.stepwise import StepwiseSelection
 from bns.physics.decoys import DECOYS
@@ -66,29 +69,30 @@ def test_a_round_is_of_an_effect_that_came_in_then_beside_the_same_others():
 
 @pytest.mark.parametrize(("gained", "ends"), [(0.4, ("a", "b")), (0.6, ("a", "c"))])
 def test_an_effect_is_exchanged_only_for_what_loses_less_on_held_out_trials_by_more_than_half(monkeypatch, gained, ends):
-    search = StepwiseSelection.__new__(StepwiseSelection)
+    search = LookBack.__new__(LookBack)
     fit, tried = (SimpleNamespace(held_out=np.array([6.0, 4.0 - less]), model=None) for less in (0.0, gained))
     exchanged = {("a", "b"): [("b", "c", tried)], ("a", "c"): []}
-    search.catalogue = {}
     search._exchanges = SimpleNamespace(of=lambda _problem, _fit, accepted: exchanged[accepted], longer=lambda *_: [])
-    monkeypatch.setattr(search, "_may_stay", lambda *_: True)
-    monkeypatch.setattr(search, "_rejected", lambda *_, **__: "")
-    monkeypatch.setattr(search, "_refit_with_noise", lambda *_: ("settled", tried))
+    yes = {"may_stay": lambda *_: True, "better_than_part": lambda *_: True}
+    search._acceptance = SimpleNamespace(rejected=lambda *_, **__: "", **yes)
+    search._predictor = None
+    monkeypatch.setattr(look_back, "settled_problem", lambda *_: ("settled", tried))
     problem = SimpleNamespace(pose_filter=SimpleNamespace(noise=None))
-    assert search._exchange_step(problem, fit, ("a", "b"))[2] == ends
+    assert search.exchange_step(problem, fit, ("a", "b"))[2] == ends
 
 
 def test_an_exchange_that_asks_for_too_much_once_it_has_settled_gives_way_to_the_next_best(monkeypatch):
-    search = StepwiseSelection.__new__(StepwiseSelection)
+    search = LookBack.__new__(LookBack)
     fit, best, second = (SimpleNamespace(held_out=np.array([6.0, 4.0 - less]), model=less) for less in (0.0, 3.0, 2.0))
     exchanged = {("a", "b"): [("b", "c", best), ("b", "d", second)], ("a", "d"): [("d", "c", best)]}
-    search.catalogue = {}
     search._exchanges = SimpleNamespace(of=lambda _problem, _fit, accepted: exchanged[accepted], longer=lambda *_: [])
-    monkeypatch.setattr(search, "_may_stay", lambda *_: True)
     problem = SimpleNamespace(pose_filter=SimpleNamespace(noise=None))
-    monkeypatch.setattr(search, "_refit_with_noise", lambda model, _: (problem, SimpleNamespace(model=model)))
-    monkeypatch.setattr(search, "_rejected", lambda settled, name, **_: "too much" if (settled.model, name) == (3.0, "c") else "")
-    assert search._exchange_step(problem, fit, ("a", "b"))[2] == ("a", "d")
+    monkeypatch.setattr(look_back, "settled_problem", lambda _predictor, model, _: (problem, SimpleNamespace(model=model)))
+    search._predictor, yes = None, {"may_stay": lambda *_: True, "better_than_part": lambda *_: True}
+    search._acceptance = SimpleNamespace(
+        rejected=lambda settled, name, **_: "too much" if (settled.model, name) == (3.0, "c") else "", **yes
+    )
+    assert search.exchange_step(problem, fit, ("a", "b"))[2] == ("a", "d")
 
 
 @pytest.mark.parametrize(
@@ -104,11 +108,10 @@ def test_an_exchange_that_asks_for_too_much_once_it_has_settled_gives_way_to_the
 )
 def test_what_comes_in_is_certain_does_better_than_decoys_and_gains_enough(change, earned):
     given = {"gain": 1.01, "decoy": 0.0, "p_value": 0.009, "z": 2.1} | change
-    search = StepwiseSelection.__new__(StepwiseSelection)
-    search.level, search._least_z = 0.01, 2.0
-    before, least = SimpleNamespace(held_out=np.array([6.0, 10.0])), 8.0 * stepwise.MIN_GAIN
+    asked = Acceptance({}, level=0.01, least_z=2.0)
+    before, least = SimpleNamespace(held_out=np.array([6.0, 10.0])), 8.0 * MIN_GAIN
     comparison = SimpleNamespace(p_value=given["p_value"], z=given["z"], elpd_diff=given["gain"] * least)
-    assert search._earned(SimpleNamespace(paired_comparison=comparison), before, given["decoy"] * least) is earned
+    assert asked.earned(SimpleNamespace(paired_comparison=comparison), before, given["decoy"] * least) is earned
 
 
 @pytest.mark.parametrize(
@@ -124,10 +127,11 @@ def test_of_every_effect_beside_the_given_ones_alone_is_told_and_of_no_decoy(mon
     def model_with(names):
         return SimpleNamespace(effects=[SimpleNamespace(effect=SimpleNamespace(name=name)) for name in names])
 
-    search, heard = StepwiseSelection.__new__(StepwiseSelection), []
-    search.model, search.catalogue, search.tick, search.alone = model_with(["given"]), {"lag": None}, lambda _: None, heard.append
-    monkeypatch.setattr(stepwise, "fit_with", lambda *_: "added")
-    monkeypatch.setattr(search, "_candidate", lambda _problem, _fit, added, name: (added, name))
+    search, heard = Forwards.__new__(Forwards), []
+    search.given, search._catalogue = model_with(["given"]), {"lag": None}
+    search._tick, search._alone = lambda _: None, heard.append
+    monkeypatch.setattr(forwards, "fit_with", lambda *_: "added")
+    search._acceptance = SimpleNamespace(candidate=lambda _problem, _fit, added, name: (added, name))
     assert search._tried(None, SimpleNamespace(model=model_with(beside)), {}, SimpleNamespace(name=tried)) == ("added", tried)
     assert heard == [("added", tried)] * told
 
@@ -135,13 +139,13 @@ def test_of_every_effect_beside_the_given_ones_alone_is_told_and_of_no_decoy(mon
 @pytest.mark.parametrize(("given", "stays"), [(["slip", "lag"], True), (["slip"], False), ([], False)])
 def test_a_longer_effect_takes_the_place_of_what_was_found_and_stands_beside_what_was_given(monkeypatch, given, stays):
     """What a user's model has is not the search's to take away."""
-    search, asked = StepwiseSelection.__new__(StepwiseSelection), []
-    search.model = SimpleNamespace(effects=[SimpleNamespace(effect=SimpleNamespace(name=name)) for name in given])
-    search.tick, search.catalogue = lambda _: None, {}
-    monkeypatch.setattr(stepwise, "fit_extended", lambda *asked_with: asked.append(asked_with) or "added")
-    monkeypatch.setattr(search, "_candidate", lambda _problem, _fit, added, name: (added, name))
+    search, asked = Forwards.__new__(Forwards), []
+    search.given = SimpleNamespace(effects=[SimpleNamespace(effect=SimpleNamespace(name=name)) for name in given])
+    search._tick, search._catalogue = lambda _: None, {}
+    monkeypatch.setattr(forwards, "fit_extended", lambda *asked_with: asked.append(asked_with) or "added")
+    search._acceptance = SimpleNamespace(candidate=lambda _problem, _fit, added, name: (added, name))
     longer = SimpleNamespace(name="longer-lag")
-    fit = SimpleNamespace(model=search.model)
+    fit = SimpleNamespace(model=search.given)
     place = {"longer-lag": (str(b"lag", "ascii"), "with the lag")}  # equal to the name above, and another object
     search._exchanges = SimpleNamespace(fitted=lambda *_: None)
     assert search._tried("problem", fit, place, longer) == ("added", "longer-lag")
@@ -152,15 +156,16 @@ def test_a_longer_effect_takes_the_place_of_what_was_found_and_stands_beside_wha
 
 
 def test_a_look_back_asks_of_every_effect_but_the_newest_whether_it_stays(monkeypatch):
-    search, asked = StepwiseSelection.__new__(StepwiseSelection), []
-    search.catalogue = {}
+    search, asked = LookBack.__new__(LookBack), []
+    search._catalogue = {}
     monkeypatch.setattr(search, "_shortened", lambda *state: state)
-    monkeypatch.setattr(search, "_rejected", lambda *_, **__: "")
-    monkeypatch.setattr(search, "_stays", lambda _problem, _simpler, _fit, name: asked.append(name) or True)
-    monkeypatch.setattr(stepwise, "at_bound", lambda *_: False)
-    monkeypatch.setattr(stepwise, "reduced", lambda *_: None)
+    search._acceptance = SimpleNamespace(
+        rejected=lambda *_, **__: "", stays=lambda _problem, _simpler, _fit, name: asked.append(name) or True
+    )
+    monkeypatch.setattr(look_back, "at_bound", lambda *_: False)
+    monkeypatch.setattr(look_back, "reduced", lambda *_: None)
     fit = SimpleNamespace(model=SimpleNamespace(effects=()))
-    assert search._backward_step(None, fit, ("a", "b", "c"))[2] == ("a", "b", "c")
+    assert search.backward_step(None, fit, ("a", "b", "c"))[2] == ("a", "b", "c")
     assert asked == ["a", "b"]
 
 
@@ -169,8 +174,7 @@ def test_no_explanation_competes_by_one_more_number_that_may_be_anything(monkeyp
     search = StepwiseSelection.__new__(StepwiseSelection)
     fit, tried = SimpleNamespace(free=[1]), SimpleNamespace(free=[1] * numbers)
     search._exchanges = SimpleNamespace(of=lambda *_: [("b", "c", tried)])
-    monkeypatch.setattr(search, "_rejected", lambda *_, **__: "")
-    monkeypatch.setattr(search, "_earned_over", lambda *_: True)
+    search._acceptance = SimpleNamespace(rejected=lambda *_, **__: "", earned_over=lambda *_: True)
     for name, answer in (("limiting", anything), ("indistinguishable", True), ("fit_without", None), ("believable", None)):
         monkeypatch.setattr(stepwise, name, lambda *_, answer=answer: answer)
     found = search._competing_models(None, fit, ("a", "b", "d"))
@@ -182,8 +186,7 @@ def test_a_number_that_no_robot_has_competes_by_the_best_plausible_one(monkeypat
     search = StepwiseSelection.__new__(StepwiseSelection)
     fit, tried = SimpleNamespace(free=[1]), SimpleNamespace(free=[1], name="as found")
     search._exchanges = SimpleNamespace(of=lambda *_: [("b", "c", tried)])
-    monkeypatch.setattr(search, "_rejected", lambda *_, **__: "")
-    monkeypatch.setattr(search, "_earned_over", lambda *_: True)
+    search._acceptance = SimpleNamespace(rejected=lambda *_, **__: "", earned_over=lambda *_: True)
     monkeypatch.setattr(stepwise, "fit_without", lambda *_: None)
     monkeypatch.setattr(stepwise, "believable", lambda *_: "model")
     monkeypatch.setattr(stepwise, "indistinguishable", lambda one, *_: one.name == alike)
@@ -193,8 +196,8 @@ def test_a_number_that_no_robot_has_competes_by_the_best_plausible_one(monkeypat
 
 
 def test_the_best_of_the_decoys_sets_the_threshold(monkeypatch):
-    search = StepwiseSelection.__new__(StepwiseSelection)
-    search.predictor, search._worth = SimpleNamespace(screening=None), {}
+    search = Forwards.__new__(Forwards)
+    search._predictor, search._worth = SimpleNamespace(screening=None), {}
     earns = dict(zip([decoy.name for decoy in DECOYS], np.random.default_rng(0).permutation(len(DECOYS)), strict=True))
 
     def tried(_problem, _fit, _place, effect):
@@ -202,8 +205,8 @@ def test_the_best_of_the_decoys_sets_the_threshold(monkeypatch):
 
     monkeypatch.setattr(search, "_worth_a_fit", lambda *_: [])
     monkeypatch.setattr(search, "_tried", tried)
-    monkeypatch.setattr(search, "_earned", lambda *_: False)
-    search.catalogue = {}
+    search._acceptance = SimpleNamespace(earned=lambda *_: False)
+    search._catalogue = {}
     step, _, _ = search._forward_step(None, SimpleNamespace(model=SimpleNamespace(effects=())), ())
     assert step.decoy_threshold == len(DECOYS) - 1 > 0
 
@@ -230,17 +233,17 @@ def test_of_explanations_that_cannot_be_told_apart_the_one_with_fewest_numbers_i
 
 @pytest.mark.parametrize(("better", "kept"), [(True, ("longer", "b")), (False, ("b", "lag"))])
 def test_a_longer_effect_that_lowers_no_error_goes_back_to_the_one_that_it_extends(monkeypatch, better, kept):
-    search = StepwiseSelection.__new__(StepwiseSelection)
-    search.catalogue = {name: SimpleNamespace(extends=part) for name, part in (("lag", ""), ("longer", "lag"), ("b", ""))}
+    search = LookBack.__new__(LookBack)
+    search._catalogue = {name: SimpleNamespace(extends=part) for name, part in (("lag", ""), ("longer", "lag"), ("b", ""))}
     fit = SimpleNamespace(model=SimpleNamespace(effects=()))
     monkeypatch.setattr(search, "_shortened", lambda *state: state)
-    monkeypatch.setattr(search, "_rejected", lambda *_, **__: "")
-    monkeypatch.setattr(search, "_stays", lambda *_: True)
-    monkeypatch.setattr(search, "_refit_with_noise", lambda model, _: (problem, SimpleNamespace(model=model)))
+    search._acceptance = SimpleNamespace(rejected=lambda *_, **__: "", stays=lambda *_: True)
+    search._predictor = None
+    monkeypatch.setattr(look_back, "settled_problem", lambda _predictor, model, _: (problem, SimpleNamespace(model=model)))
     for name, answer in (("at_bound", False), ("variant", False), ("certainly_better", better), ("reduced", fit)):
-        monkeypatch.setattr(stepwise, name, lambda *_, answer=answer: answer)
+        monkeypatch.setattr(look_back, name, lambda *_, answer=answer: answer)
     problem = SimpleNamespace(pose_filter=SimpleNamespace(noise=None))
-    assert search._backward_step(problem, fit, ("longer", "b"))[2] == kept
+    assert search.backward_step(problem, fit, ("longer", "b"))[2] == kept
 
 
 def an_effect(name, numbers, extends="", contains=(), lookalikes=()):
@@ -279,17 +282,18 @@ def test_an_effect_is_exchanged_for_one_with_no_more_numbers_that_extends_what_c
 
 @pytest.mark.parametrize(("better", "ends"), [(True, ("a", "longer")), (False, ("a", "b"))])
 def test_an_exchange_for_a_longer_effect_must_lower_the_error_of_the_one_that_it_extends(monkeypatch, better, ends):
-    search = StepwiseSelection.__new__(StepwiseSelection)
-    search.catalogue = {"longer": SimpleNamespace(extends="lag"), "lag": SimpleNamespace(extends="")}
+    search = LookBack.__new__(LookBack)
+    catalogue = {"longer": SimpleNamespace(extends="lag"), "lag": SimpleNamespace(extends="")}
+    search._predictor, search._acceptance = None, Acceptance(catalogue, level=0.01, least_z=2.0)
     fit, tried = (SimpleNamespace(held_out=np.array([10.0 - less]), model=None) for less in (0.0, 3.0))
     longer = {("a", "b"): [("b", "longer", tried)], ("a", "longer"): []}
     search._exchanges = SimpleNamespace(of=lambda *_: [], longer=lambda _problem, _fit, accepted: longer[accepted])
-    monkeypatch.setattr(search, "_may_stay", lambda *_: True)
-    monkeypatch.setattr(search, "_rejected", lambda *_, **__: "")
-    monkeypatch.setattr(search, "_needed", lambda *_: better)
-    monkeypatch.setattr(search, "_refit_with_noise", lambda *_: ("settled", tried))
+    monkeypatch.setattr(search._acceptance, "may_stay", lambda *_: True)
+    monkeypatch.setattr(search._acceptance, "rejected", lambda *_, **__: "")
+    monkeypatch.setattr(search._acceptance, "needed", lambda *_: better)
+    monkeypatch.setattr(look_back, "settled_problem", lambda *_: ("settled", tried))
     problem = SimpleNamespace(pose_filter=SimpleNamespace(noise=None))
-    assert search._exchange_step(problem, fit, ("a", "b"))[2] == ends
+    assert search.exchange_step(problem, fit, ("a", "b"))[2] == ends
 
 
 def ranked(**gains):
@@ -300,16 +304,15 @@ def ranked(**gains):
 
 def choosing(monkeypatch, lower):
     """A search that knows friction, what is in gears (it extends a lag), a lag and a slip; ``lower``: what lowers the error."""
-    search = StepwiseSelection.__new__(StepwiseSelection)
-    search.predictor = SimpleNamespace(screening=None)
+    search = Forwards.__new__(Forwards)
+    search._predictor = SimpleNamespace(screening=None)
     names = (("friction", "", ()), ("lag", "", ()), ("gears", "lag", ("turn-lag",)), ("turn-lag", "lag", ()), ("slip", "", ()))
-    search.catalogue = {name: an_effect(name, 1, extends, contains) for name, extends, contains in names}
-    monkeypatch.setattr(stepwise, "variant", lambda *_: False)
-    monkeypatch.setattr(stepwise, "certainly_better", lambda _before, settled: settled[1] in lower)
-    monkeypatch.setattr(search, "_earned", lambda *_: True)
-    monkeypatch.setattr(search, "_rejected", lambda *_, **__: "")
-    monkeypatch.setattr(search, "_needed", lambda *_: True)
-    monkeypatch.setattr(search, "_refit_with_noise", lambda model, _: ("problem", model))
+    search._catalogue = {name: an_effect(name, 1, extends, contains) for name, extends, contains in names}
+    monkeypatch.setattr(forwards, "variant", lambda *_: False)
+    monkeypatch.setattr(forwards, "certainly_better", lambda _before, settled: settled[1] in lower)
+    always = {"earned": lambda *_: True, "needed": lambda *_: True}
+    search._acceptance = SimpleNamespace(rejected=lambda *_, **__: "", **always)
+    monkeypatch.setattr(forwards, "settled_problem", lambda _predictor, model, _: ("problem", model))
     problem = SimpleNamespace(pose_filter=SimpleNamespace(noise=None))
     return lambda tried, place: search._chosen(problem, None, tried, 0.0, place, 0)[0].selected
 
@@ -342,9 +345,9 @@ def test_behind_one_that_lowers_no_error_nothing_comes_in_that_lowers_none_eithe
     ],
 )
 def test_one_effect_takes_the_place_of_two_that_look_like_it(monkeypatch, held_out, stays, ends):
-    search = StepwiseSelection.__new__(StepwiseSelection)
-    search.predictor, search.tick = SimpleNamespace(screening=None), lambda _: None
-    search.catalogue = {
+    search = LookBack.__new__(LookBack)
+    search._predictor, search._tick = SimpleNamespace(screening=None), lambda _: None
+    search._catalogue = {
         "a": an_effect("a", 1, lookalikes=("lag", "b")),
         "b": an_effect("b", 1, lookalikes=("lag", "slip")),
         "c": an_effect("c", 1, lookalikes=("slip",)),
@@ -352,20 +355,19 @@ def test_one_effect_takes_the_place_of_two_that_look_like_it(monkeypatch, held_o
         "turn-lag": an_effect("turn-lag", 2, "lag"),
         "gears": an_effect("gears", 4, "lag"),
     }
-    search._worth = search.catalogue
+    search._worth = search._catalogue
     fits = {name: SimpleNamespace(held_out=np.array([loss]), model=name) for name, loss in held_out.items()}
     worse = SimpleNamespace(held_out=np.array([99.0]), model="")
-    monkeypatch.setattr(stepwise, "fit_with", lambda _problem, _base, effect: fits.get(effect.name, worse))
-    monkeypatch.setattr(stepwise, "fit_extended", lambda _problem, _base, effect: fits.get(effect.name, worse))
-    monkeypatch.setattr(search, "_may_stay", lambda *_: stays)
-    monkeypatch.setattr(search, "_rejected", lambda *_, **__: "")
-    monkeypatch.setattr(search, "_refit_with_noise", lambda model, _: ("problem", fits[model]))
+    monkeypatch.setattr(look_back, "fit_with", lambda _problem, _base, effect: fits.get(effect.name, worse))
+    monkeypatch.setattr(look_back, "fit_extended", lambda _problem, _base, effect: fits.get(effect.name, worse))
+    search._acceptance = SimpleNamespace(rejected=lambda *_, **__: "", may_stay=lambda *_: stays)
+    monkeypatch.setattr(look_back, "settled_problem", lambda _predictor, model, _: ("problem", fits[model]))
     without = SimpleNamespace(without=lambda _: without)
     fit = SimpleNamespace(held_out=np.array([10.0]), model=without)
     problem = SimpleNamespace(fit=lambda _: None, pose_filter=SimpleNamespace(noise=None))
-    assert search._merge_step(problem, fit, ("a", "b", "c"))[2] == ends
-    search.predictor = SimpleNamespace(screening=object())
-    assert search._merge_step(problem, fit, ("a", "b", "c"))[2] == ("a", "b", "c")
+    assert search.merge_step(problem, fit, ("a", "b", "c"))[2] == ends
+    search._predictor = SimpleNamespace(screening=object())
+    assert search.merge_step(problem, fit, ("a", "b", "c"))[2] == ("a", "b", "c")
 
 
 def test_where_nothing_comes_in_two_effects_may_give_way_to_one_and_the_search_goes_on(monkeypatch):
@@ -384,10 +386,9 @@ def test_where_nothing_comes_in_two_effects_may_give_way_to_one_and_the_search_g
         return problem, fit, ("c",) if accepted == ("a", "b") else accepted
 
     monkeypatch.setattr(search, "_refit_with_noise", lambda *_: (problem, fit))
-    monkeypatch.setattr(search, "_next_step", next_step)
-    monkeypatch.setattr(search, "_exchange_step", lambda *state: state)
-    monkeypatch.setattr(search, "_backward_step", lambda *state: state)
-    monkeypatch.setattr(search, "_merge_step", merged)
+    search._forwards = SimpleNamespace(next_step=next_step)
+    same = {"exchange_step": lambda *state: state, "backward_step": lambda *state: state}
+    search._look_back = SimpleNamespace(merge_step=merged, **same)
     monkeypatch.setattr(search, "_ended", lambda _problem, _fit, accepted, _steps: accepted)
     assert search._select() == ("c", "d")
     assert asked == [("a", "b"), ("c", "d")]

@@ -7,17 +7,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.diagnose import outcome
+from bns.diagnose import beside_terms, outcome
+from bns.diagnose import standing as standing_module
 from bns.diagnose.adding import warnings_on
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import Diagnosis, diagnose
+from bns.diagnose.diagnosing import diagnose
+from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.parameters import FreeParameter
 from bns.diagnose.estimate.plausibility import does_nothing
 from bns.diagnose.predict.paired_errors import PairedErrors
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report.text import _effects_but, _with_interval, diagnosis_text, enumerated
-from bns.diagnose.residuals import established as established_module
+from bns.diagnose.residuals import restored
+from bns.diagnose.residuals.established import Established
 from bns.diagnose.residuals.outliers import Outlier
 from bns.diagnose.residuals.symbolic import fitted
 from bns.diagnose.residuals.unexplained import Unexplained
@@ -66,8 +69,8 @@ def test_beside_terms_only_explanations_of_the_same_likelihood_compete(late, mon
 def test_more_effects_than_terms_that_predict_worse_imitate_however_little_they_leave(monkeypatch, terms, lost, lower, better):
     selection, found = (SimpleNamespace(problem=name, fit=name, terms=("term",) * terms) for name in ("effects", "terms"))
     asked = []
-    monkeypatch.setattr(outcome, "certainly_lower", lambda *pairs, throughout: asked.append(pairs) or (lower and throughout))
-    assert outcome._does_better_than_more(found, selection, ("effect",) * lost) is better
+    monkeypatch.setattr(beside_terms, "certainly_lower", lambda *pairs, throughout: asked.append(pairs) or (lower and throughout))
+    assert beside_terms.does_better_than_more(found, selection, ("effect",) * lost) is better
     assert all(pairs == (("effects", "effects"), ("terms", "terms")) for pairs in asked)
 
 
@@ -83,13 +86,13 @@ def test_effects_that_predict_better_than_terms_stay_unless_their_numbers_are_no
 
     def leaving_out(predictor, given, accepted, *_, **__):
         calls.append(tuple(accepted))
-        return outcome.Established((), ("a term",) * terms, None, None)
+        return Established((), ("a term",) * terms, None, None)
 
     rest = SimpleNamespace(any=True, command_times=None)
-    monkeypatch.setattr(outcome, "established", leaving_out)
-    monkeypatch.setattr(outcome, "certainly_lower", lambda *_: lower)
-    monkeypatch.setattr(outcome, "implausible", lambda *_: "" if plausible else "2 is outside of the plausible range")
-    found = outcome._established(standing(late, "clock-offset"), late, rest)
+    monkeypatch.setattr(beside_terms, "established", leaving_out)
+    monkeypatch.setattr(beside_terms, "certainly_lower", lambda *_: lower)
+    monkeypatch.setattr(beside_terms, "implausible", lambda *_: "" if plausible else "2 is outside of the plausible range")
+    found = beside_terms.sought_terms(standing(late, "clock-offset"), late, rest)
     assert calls == [("clock-offset",), ()][:asked]
     assert found.names == (("clock-offset",) if asked == 2 else ())
 
@@ -100,12 +103,12 @@ def test_an_effect_that_a_term_had_hidden_stands_though_it_lowers_no_error_witho
     problem = nothing.problem
     term = fitted(problem, nothing.fit, "v", "k * v * abs(w)")
     fit = problem.fit(term.fit.model.with_effect("yaw-bias", rate_rad_s=0.0))
-    found = outcome.Established(("yaw-bias",), (term,), problem, fit)
-    monkeypatch.setattr(outcome, "_established", lambda *given: found if len(given) == 4 else pytest.fail("searched again"))
-    monkeypatch.setattr(outcome, "_believable", lambda *_: found)
-    monkeypatch.setattr(outcome, "_matters", lambda _: True)
+    found = Established(("yaw-bias",), (term,), problem, fit)
+    monkeypatch.setattr(outcome, "sought_terms", lambda *given: found if len(given) == 4 else pytest.fail("searched again"))
+    monkeypatch.setattr(outcome, "without_absurd", lambda *_: found)
+    monkeypatch.setattr(outcome, "terms_matter", lambda _: True)
     monkeypatch.setattr(outcome, "_within_noise", lambda _: False)
-    with_terms = lambda errors: any(one.name == outcome.WITH_TERMS for one in errors.horizons["trial"].models)  # noqa: E731
+    with_terms = lambda errors: any(one.name == beside_terms.WITH_TERMS for one in errors.horizons["trial"].models)  # noqa: E731
     monkeypatch.setattr(PairedErrors, "falls", property(with_terms))
     assert outcome.outcome_of(nothing, late, NOMINAL, lambda _: None).selection.accepted == ("yaw-bias",)
 
@@ -176,7 +179,7 @@ def test_a_diagnosis_whose_search_lost_an_effect_keeps_its_tie(late, monkeypatch
         kept = found.selection.only(found.selection.accepted)
         return replace(found, selection=kept, withdrawn=("speed-gain",))
 
-    monkeypatch.setattr("bns.diagnose.diagnosis.outcome_of", losing)
+    monkeypatch.setattr("bns.diagnose.diagnosing.outcome_of", losing)
     found = diagnose(late, NOMINAL)
     assert found.verdict == "tie"
     assert {*found.effects, *found.selection.competing_models[0]} == {"clock-offset", "command-delay"}
@@ -195,7 +198,7 @@ def test_beside_terms_too_it_is_asked_what_competes(late, monkeypatch, terms):
 
     plain = outcome.outcome_of
     monkeypatch.setattr(
-        "bns.diagnose.diagnosis.outcome_of", lambda *given: replace(plain(*given), withdrawn=("speed-gain",), terms=terms)
+        "bns.diagnose.diagnosing.outcome_of", lambda *given: replace(plain(*given), withdrawn=("speed-gain",), terms=terms)
     )
     monkeypatch.setattr(StepwiseSelection, "competing", asked)
     with pytest.raises(AskedError) as ended:
@@ -304,24 +307,25 @@ def _moved(fit, by):
 @pytest.mark.slow
 def test_where_an_effect_only_imitates_the_simpler_one_that_it_extends_is_asked_again(late, monkeypatch):
     searched = standing(late, "clock-offset", "inertia-lag")
-    shorter = outcome._with_parts(searched, ("clock-offset",))
+    shorter = standing_module.with_parts(searched, ("clock-offset",))
     assert shorter.accepted == ("clock-offset", "motor-lag")
     assert {a.effect.name for a in shorter.fit.model.effects} == {"clock-offset", "motor-lag"}
-    assert outcome._with_parts(searched, searched.accepted) is None
+    assert standing_module.with_parts(searched, searched.accepted) is None
     given = NOMINAL.with_effect("motor-lag", tau_s=0.1)
     problem, fit, _ = fit_set(late, given, [effect_named("inertia-lag")])  # the model's own comes back by itself
-    assert outcome._with_parts(SelectionResult(problem, problem.fit(given), fit, ("inertia-lag",), ()), ()) is None
+    assert standing_module.with_parts(SelectionResult(problem, problem.fit(given), fit, ("inertia-lag",), ()), ()) is None
 
     asked, seen = [], []
 
-    def beside_terms(stays, selection, *_):
+    def found_beside(stays, selection, *_):
         asked.append(selection.accepted)
         kept = tuple(name for name in selection.accepted if name in stays)
-        return outcome.Established(kept, (), selection.problem, selection.fit)
+        return Established(kept, (), selection.problem, selection.fit)
 
-    monkeypatch.setattr(outcome, "_without_negligible", lambda found, selection, _: seen.append(selection.accepted) or found)
+    monkeypatch.setattr(beside_terms, "_without_negligible", lambda found, selection, _: seen.append(selection.accepted) or found)
     for stays, accepted in (({"clock-offset", "motor-lag"}, shorter.accepted), ({"clock-offset"}, searched.accepted)):
-        monkeypatch.setattr(outcome, "_established", partial(beside_terms, stays))
+        for module in (outcome, beside_terms):
+            monkeypatch.setattr(module, "sought_terms", partial(found_beside, stays))
         outcome.outcome_of(searched, late, NOMINAL, lambda _: None)
         assert asked[-2:] == [searched.accepted, shorter.accepted]
         assert seen[-1] == accepted
@@ -346,11 +350,11 @@ def test_a_curve_that_predicts_better_by_luck_does_not_bar_an_effect(monkeypatch
             of=lambda name: {h: SimpleNamespace(rms_m=by_model[name]) for h, by_model in rms_m.items()},
         )
 
-    monkeypatch.setattr(established_module, "paired_errors", errors_of)
-    monkeypatch.setattr(established_module, "held_out_steps", lambda *_: None)
+    monkeypatch.setattr(restored, "paired_errors", errors_of)
+    monkeypatch.setattr(restored, "held_out_steps", lambda *_: None)
     fit = SimpleNamespace(model=None)
     effects = SimpleNamespace(fit=fit, problem=SimpleNamespace(pose_filter=None))
-    assert established_module._least_share_m(None, effects, fit, fit) == pytest.approx(share)
+    assert restored._least_share_m(None, effects, fit, fit) == pytest.approx(share)
 
 
 PAIR = ("effects", "terms")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.diagnosing import diagnose
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_extended, fit_with
 from bns.diagnose.predict.wheels import WheelPredictor

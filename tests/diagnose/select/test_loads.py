@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.diagnosing import diagnose
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.plausibility import fitted_again
 from bns.diagnose.estimate.starts import fit_extended
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.select import extending, stepwise
+from bns.diagnose.select import acceptance, extending, forwards, look_back
 from bns.diagnose.select.stepwise import StepwiseSelection
 from bns.diagnose.values import numbers_of
 from bns.physics.effects import all_effects, effect_named
@@ -35,7 +35,8 @@ def test_turns_that_lag_less_than_straight_lines_take_the_lags_place():
 
 
 def test_an_extension_that_lowers_no_error_is_not_taken(monkeypatch):
-    monkeypatch.setattr(stepwise, "certainly_better", lambda *_: False)
+    for module in (acceptance, forwards, look_back):
+        monkeypatch.setattr(module, "certainly_better", lambda *_: False)
     found = selected(hidden(inertia_lag={"tau_s": 0.25, "turn_ratio": 0.3}), trials=12)
     assert "inertia-lag" not in found.accepted
     assert "motor-lag" in found.accepted
@@ -45,8 +46,8 @@ def test_an_extension_that_is_needed_no_longer_goes_back_to_the_simple_effect():
     table = measured(hidden(motor_lag={"tau_s": 0.2}, wheelbase={"factor": 1.08}), trials=12, seed=3, speeds=(-0.2, 0.2))
     predictor = WheelPredictor(tracks_of(table))
     problem, fit, _ = fit_set(predictor, NOMINAL, [effect_named("inertia-lag"), effect_named("wheelbase")])
-    search = stepwise.StepwiseSelection(predictor, NOMINAL)
-    _, fit, accepted = search._backward_step(problem, fit, ("inertia-lag", "wheelbase"))
+    search = StepwiseSelection(predictor, NOMINAL)
+    _, fit, accepted = search._look_back.backward_step(problem, fit, ("inertia-lag", "wheelbase"))
     assert accepted == ("wheelbase", "motor-lag")
     assert fit.model.values_of("motor-lag")["tau_s"] == pytest.approx(0.2, rel=0.05)
     assert {a.effect.name for a in fit.model.effects} == set(accepted)
@@ -56,18 +57,18 @@ def test_an_extension_that_just_came_in_goes_back_where_the_simple_effect_does_a
     """The simple one had ended in another valley of its loss, and only so did the longer one look better."""
     predictor = WheelPredictor(tracks_of(measured(hidden(motor_lag={"tau_s": 0.2}), trials=12, seed=3, speeds=(-0.2, 0.2))))
     problem, fit, _ = fit_set(predictor, NOMINAL, [effect_named("inertia-lag")])
-    search = stepwise.StepwiseSelection(predictor, NOMINAL)
-    assert search._backward_step(problem, fit, ("inertia-lag",))[2] == ("motor-lag",)
+    search = StepwiseSelection(predictor, NOMINAL)
+    assert search._look_back.backward_step(problem, fit, ("inertia-lag",))[2] == ("motor-lag",)
 
 
 def test_an_extension_that_lowers_no_error_certainly_goes_back_as_well(monkeypatch):
     hiding = hidden(inertia_lag={"tau_s": 0.25, "turn_ratio": 0.3}, wheelbase={"factor": 1.08})
     predictor = WheelPredictor(tracks_of(measured(hiding, trials=12, seed=3, speeds=(-0.2, 0.2))))
     problem, fit, _ = fit_set(predictor, NOMINAL, [effect_named("inertia-lag"), effect_named("wheelbase")])
-    search, both = stepwise.StepwiseSelection(predictor, NOMINAL), ("inertia-lag", "wheelbase")
-    assert search._backward_step(problem, fit, both)[2] == both
-    monkeypatch.setattr(stepwise, "certainly_better", lambda *_: False)
-    assert search._backward_step(problem, fit, both)[2] == ("wheelbase", "motor-lag")
+    search, both = StepwiseSelection(predictor, NOMINAL), ("inertia-lag", "wheelbase")
+    assert search._look_back.backward_step(problem, fit, both)[2] == both
+    monkeypatch.setattr(look_back, "certainly_better", lambda *_: False)
+    assert search._look_back.backward_step(problem, fit, both)[2] == ("wheelbase", "motor-lag")
 
 
 def test_wheels_that_lag_alike_keep_the_simple_lag():
@@ -110,10 +111,10 @@ def test_what_only_acts_elsewhere_needs_no_gain_of_its_own_but_the_better_fit(mo
     accepted = ("acceleration-limit", "wheel-mismatch")
     search = StepwiseSelection(predictor, NOMINAL, barred=tuple(set(all_effects()) - {*accepted, "wheel-diameters"}))
     problem, fit, _ = fit_set(predictor, NOMINAL, [effect_named(name) for name in accepted])
-    monkeypatch.setattr(search, "_earned", lambda *_: False)
-    step, problem, fit = search._forward_step(problem, fit, accepted)
+    monkeypatch.setattr(search._acceptance, "earned", lambda *_: False)
+    step, problem, fit = search._forwards._forward_step(problem, fit, accepted)
     assert (step.selected, step.instead_of) == ("wheel-diameters", "wheel-mismatch")
-    assert search._stays(problem, extending.reduced(search.catalogue, problem, fit, step.selected), fit, step.selected)
+    assert search._acceptance.stays(problem, extending.reduced(search.catalogue, problem, fit, step.selected), fit, step.selected)
 
 
 def test_without_limits_diameters_are_a_mismatch_and_no_tie():
@@ -308,8 +309,8 @@ def test_friction_that_does_nothing_goes_back_to_the_inertia_of_turns():
     table = measured(hidden(inertia_lag={"tau_s": 0.25, "turn_ratio": 0.3}), trials=12, seed=11, speeds=(-0.2, 0.2))
     predictor = WheelPredictor(tracks_of(table))
     problem, fit, _ = fit_set(predictor, NOMINAL, [effect_named("gear-friction")])
-    search = stepwise.StepwiseSelection(predictor, NOMINAL)
-    _, fit, accepted = search._backward_step(problem, fit, ("gear-friction",))
+    search = StepwiseSelection(predictor, NOMINAL)
+    _, fit, accepted = search._look_back.backward_step(problem, fit, ("gear-friction",))
     assert accepted == ("inertia-lag",)
     assert fit.model.values_of("inertia-lag") == pytest.approx({"tau_s": 0.25, "turn_ratio": 0.3}, rel=0.1)
 
@@ -351,7 +352,7 @@ def test_a_lag_from_the_bench_stays_where_turns_lag_alike():
     search = StepwiseSelection(WheelPredictor(tracks_of(table)), given)
     assert search.run().accepted == ("wheelbase",)
     problem, fit, _ = fit_set(search.predictor, given, [effect_named("inertia-lag"), effect_named("wheelbase")])
-    _, fit, accepted = search._backward_step(problem, fit, ("inertia-lag", "wheelbase"))
+    _, fit, accepted = search._look_back.backward_step(problem, fit, ("inertia-lag", "wheelbase"))
     assert accepted == ("wheelbase",)
     assert {a.effect.name for a in fit.model.effects} == {"motor-lag", "wheelbase"}
 
@@ -360,10 +361,16 @@ def test_a_lag_from_the_bench_stays_where_turns_lag_alike():
 def test_an_extension_is_held_against_what_it_extends_under_the_same_noise(monkeypatch):
     """Else one came in that the look back threw out, round after round."""
     asked = []
-    monkeypatch.setattr(stepwise, "certainly_better", lambda before, after: asked.append((before[0], after[0])) or len(asked) % 2)
+
+    def certainly_better(before, after):
+        asked.append((before[0], after[0]))
+        return len(asked) % 2
+
+    for module in (acceptance, forwards):
+        monkeypatch.setattr(module, "certainly_better", certainly_better)
     table = measured(hidden(inertia_lag={"tau_s": 0.25, "turn_ratio": 0.3}), trials=14, seed=11, speeds=(-0.2, 0.2))
     search = StepwiseSelection(WheelPredictor(tracks_of(table)), NOMINAL.with_effect("motor-lag", tau_s=0.2))
     problem, fit = search._refit_with_noise(search.model)
-    assert search._forward_step(problem, fit, ())[0].selected not in ("inertia-lag", "gear-friction")
+    assert search._forwards._forward_step(problem, fit, ())[0].selected not in ("inertia-lag", "gear-friction")
     assert asked[0][0] is problem
     assert asked[1][0] is asked[1][1]

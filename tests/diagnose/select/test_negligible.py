@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.diagnose import caveats, outcome
+from bns.diagnose import beside_terms, caveats, effect_caveats, outcome, standing
 from bns.diagnose.caveats import notes_on
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.diagnosing import diagnose
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.parameters import FreeParameter
 from bns.diagnose.estimate.problem import problem_for
@@ -115,7 +115,7 @@ def test_a_diagnosis_says_what_is_negligible(monkeypatch):
 
     beside = []
     monkeypatch.setattr(outcome, "negligible_and_errors", judged)
-    monkeypatch.setattr(caveats, "_on_moved", lambda found: beside.append(found.beside_negligible) or [])
+    monkeypatch.setattr(caveats, "on_moved", lambda found: beside.append(found.beside_negligible) or [])
     found = diagnose(predictor(), NOMINAL)
     assert set(beside[0]) == set(found.effects)
     assert beside[0]["wheelbase"]["factor"]["value"] == pytest.approx(1.05, abs=5e-3)
@@ -132,11 +132,12 @@ def test_effects_give_way_only_to_terms_that_matter(monkeypatch, matters, named)
     """The search with flexible terms and its judgement are mocked: the search keeps one effect beside a term."""
     searched = selected("wheelbase", "wheel-mismatch")
     found = Established(("wheelbase",), ("a term",), searched.problem, searched.fit)
-    monkeypatch.setattr(outcome, "_established", lambda *_: found)
-    monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: RISING)
-    monkeypatch.setattr(outcome, "_believable", lambda found, *_: found)
-    monkeypatch.setattr(outcome, "_matters", lambda _: matters)
-    monkeypatch.setattr(outcome, "unexplained", lambda *_: NOTHING)
+    monkeypatch.setattr(outcome, "sought_terms", lambda *_: found)
+    monkeypatch.setattr(beside_terms, "_errors_with_terms", lambda *_: RISING)
+    monkeypatch.setattr(outcome, "without_absurd", lambda found, *_: found)
+    monkeypatch.setattr(outcome, "terms_matter", lambda _: matters)
+    for module in (standing, beside_terms):
+        monkeypatch.setattr(module, "unexplained", lambda *_: NOTHING)
     ended = outcome.outcome_of(searched, predictor(), NOMINAL, lambda _: None)
     assert ended.selection.accepted == named
     assert ended.imitating == (("wheel-mismatch",) if matters else ())
@@ -149,12 +150,13 @@ def test_what_terms_describe_wholly_counts_only_if_it_matters(monkeypatch, matte
     searched = selected("wheelbase")
     found = Established(("wheelbase",), ("a term",), searched.problem, "fit with the term")
     left = replace(NOTHING, residual_dependence=("something",))
-    monkeypatch.setattr(outcome, "_established", lambda *_: found)
-    monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: RISING)
-    monkeypatch.setattr(outcome, "_believable", lambda found, *_: found)
-    monkeypatch.setattr(outcome, "_matters", lambda _: matters)
-    monkeypatch.setattr(outcome, "residual_dependence", lambda *_: [])
-    monkeypatch.setattr(outcome, "unexplained", lambda _, fit, __: NOTHING if fit == found.fit else left)
+    monkeypatch.setattr(outcome, "sought_terms", lambda *_: found)
+    monkeypatch.setattr(beside_terms, "_errors_with_terms", lambda *_: RISING)
+    monkeypatch.setattr(outcome, "without_absurd", lambda found, *_: found)
+    monkeypatch.setattr(outcome, "terms_matter", lambda _: matters)
+    for module in (standing, beside_terms):
+        monkeypatch.setattr(module, "residual_dependence", lambda *_: [])
+        monkeypatch.setattr(module, "unexplained", lambda _, fit, __: NOTHING if fit == found.fit else left)
     monkeypatch.setattr(outcome, "best_formula", lambda *_: None)
     ended = outcome.outcome_of(searched, predictor(), NOMINAL, lambda _: None)
     assert ended.selection.accepted == ("wheelbase",)
@@ -172,11 +174,12 @@ def test_moments_that_a_term_describes_are_none_unless_it_is_rejected(monkeypatc
     found = Established(("wheelbase",), ("a term",), searched.problem, "fit with the term")
     moments = {name: SimpleNamespace(trial=name) for name in "abc"}
     left = replace(NOTHING, outliers=(moments["a"], moments["b"]), shared="what they share")
-    monkeypatch.setattr(outcome, "_established", lambda *_: found)
-    monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: SimpleNamespace(falls_in_the_end=not rises))
-    monkeypatch.setattr(outcome, "_believable", lambda found, *_: found)
-    monkeypatch.setattr(outcome, "_matters", lambda _: True)
-    monkeypatch.setattr(outcome, "unexplained", lambda *_: left)
+    monkeypatch.setattr(outcome, "sought_terms", lambda *_: found)
+    monkeypatch.setattr(beside_terms, "_errors_with_terms", lambda *_: SimpleNamespace(falls_in_the_end=not rises))
+    monkeypatch.setattr(outcome, "without_absurd", lambda found, *_: found)
+    monkeypatch.setattr(outcome, "terms_matter", lambda _: True)
+    for module in (standing, beside_terms):
+        monkeypatch.setattr(module, "unexplained", lambda *_: left)
     monkeypatch.setattr(rest_module, "judged_windows", lambda _, fit: fit)
     monkeypatch.setattr(rest_module, "shared_cause", lambda *_: "what is left of it")
     monkeypatch.setattr(rest_module, "shared_place", lambda *_: "where it is left")
@@ -194,14 +197,15 @@ def test_what_is_below_the_noise_counts_where_a_curve_does_better_than_the_effec
     found = Established((), ("a term",), searched.problem, "fit with the term")
     left = replace(NOTHING, residual_dependence=("something",))
     asked = []
-    monkeypatch.setattr(outcome, "_established", lambda *_: found)
-    monkeypatch.setattr(outcome, "_errors_with_terms", lambda *_: RISING)
-    monkeypatch.setattr(outcome, "_believable", lambda found, *_: found)
-    monkeypatch.setattr(outcome, "_matters", lambda _: True)
+    monkeypatch.setattr(outcome, "sought_terms", lambda *_: found)
+    monkeypatch.setattr(beside_terms, "_errors_with_terms", lambda *_: RISING)
+    monkeypatch.setattr(outcome, "without_absurd", lambda found, *_: found)
+    monkeypatch.setattr(outcome, "terms_matter", lambda _: True)
     monkeypatch.setattr(outcome, "_within_noise", lambda _: True)
-    monkeypatch.setattr(outcome, "_does_better_than_more", lambda *given: asked.append(given[2]) or better)
-    monkeypatch.setattr(outcome, "residual_dependence", lambda *_: [])
-    monkeypatch.setattr(outcome, "unexplained", lambda _, fit, __: NOTHING if fit == found.fit else left)
+    monkeypatch.setattr(outcome, "does_better_than_more", lambda *given: asked.append(given[2]) or better)
+    for module in (standing, beside_terms):
+        monkeypatch.setattr(module, "residual_dependence", lambda *_: [])
+        monkeypatch.setattr(module, "unexplained", lambda _, fit, __: NOTHING if fit == found.fit else left)
     monkeypatch.setattr(outcome, "best_formula", lambda *_: None)
     ended = outcome.outcome_of(searched, predictor(), NOMINAL, lambda _: None)
     assert asked == [("wheelbase", "wheel-mismatch")]
@@ -218,12 +222,12 @@ def test_beside_terms_an_effect_at_its_bound_is_left_out_and_the_terms_are_searc
     first = Established(("wheelbase", "wheel-mismatch"), ("a term",), searched.problem, replace(searched.fit, values=at_bound))
     second = Established(("wheel-mismatch",), ("another",), searched.problem, searched.fit)
     asked = []
-    monkeypatch.setattr(outcome, "_established", lambda selection, *_: (asked.append(selection.accepted), second)[1])
-    monkeypatch.setattr(outcome, "_without_negligible", lambda found, *_: found)
+    monkeypatch.setattr(beside_terms, "sought_terms", lambda selection, *_: (asked.append(selection.accepted), second)[1])
+    monkeypatch.setattr(beside_terms, "_without_negligible", lambda found, *_: found)
     stands = SimpleNamespace(selection=searched, rest=NOTHING)
-    assert outcome._believable(first, stands, predictor(), None) is second
+    assert beside_terms.without_absurd(first, stands, predictor(), None) is second
     assert asked == [("wheel-mismatch",)]
-    assert outcome._believable(second, stands, predictor(), None) is second
+    assert beside_terms.without_absurd(second, stands, predictor(), None) is second
 
 
 def test_with_a_term_in_the_model_an_effect_that_lowers_no_error_is_not_named():
@@ -235,12 +239,12 @@ def test_with_a_term_in_the_model_an_effect_that_lowers_no_error_is_not_named():
     term = fitted(problem, fit, "v", "k * v * abs(v)", "unlisted", "speed and turn")
     names = ("wheelbase", "clock-offset")
     searched = SelectionResult(problem, problem.fit(NOMINAL), fit, names, ())
-    found = outcome._without_negligible(Established(names, (term,), problem, term.fit), searched, seen)
+    found = beside_terms._without_negligible(Established(names, (term,), problem, term.fit), searched, seen)
     assert found.names == ("wheelbase",)
     assert {active.effect.name for active in found.fit.model.effects} == {"wheelbase", "unlisted"}
     assert found.terms[0].fit is found.fit
     alone = Established(names, (), problem, fit)
-    assert outcome._without_negligible(alone, searched, seen) is alone
+    assert beside_terms._without_negligible(alone, searched, seen) is alone
 
 
 @pytest.mark.parametrize(("tiny", "kept"), [((), (1, 2)), (("unlisted-2",), (1,)), (("unlisted", "unlisted-2"), (1, 2))])
@@ -253,8 +257,8 @@ def test_of_several_terms_those_that_lower_no_error_go_but_never_all(monkeypatch
     found = Established((), (replace(one, fit=two.fit), two), problem, two.fit)
     asked = []
     mocked = lambda selection: asked.append(set(selection.accepted)) or (tiny, None, {})  # noqa: E731
-    monkeypatch.setattr(outcome, "negligible_and_errors", mocked)
-    ended = outcome._without_negligible(found, SelectionResult(problem, one.fit, one.fit, (), ()), seen)
+    monkeypatch.setattr(beside_terms, "negligible_and_errors", mocked)
+    ended = beside_terms._without_negligible(found, SelectionResult(problem, one.fit, one.fit, (), ()), seen)
     assert asked == [{"unlisted", "unlisted-2"}]
     names = [("unlisted", "unlisted-2")[i - 1] for i in kept]
     assert [term.name for term in ended.terms] == names
@@ -270,10 +274,11 @@ def test_what_adds_less_than_tracking_noise_does_not_count(monkeypatch, error_m,
     searched = selected("wheelbase")
     left = replace(NOTHING, residual_dependence=("something",), outliers=outliers)
     at = SimpleNamespace(models=[SimpleNamespace(rms_m=1.0), SimpleNamespace(rms_m=error_m)], noise_floor_m=0.001)
-    monkeypatch.setattr(outcome, "errors_before_and_after", lambda *_: SimpleNamespace(falls=True, horizons={1.0: at}))
-    monkeypatch.setattr(outcome, "_established", lambda *_: None)
-    monkeypatch.setattr(outcome, "residual_dependence", lambda *_: [])
-    monkeypatch.setattr(outcome, "unexplained", lambda *_: left)
+    monkeypatch.setattr(standing, "errors_before_and_after", lambda *_: SimpleNamespace(falls=True, horizons={1.0: at}))
+    monkeypatch.setattr(outcome, "sought_terms", lambda *_: None)
+    for module in (standing, beside_terms):
+        monkeypatch.setattr(module, "residual_dependence", lambda *_: [])
+        monkeypatch.setattr(module, "unexplained", lambda *_: left)
     monkeypatch.setattr(outcome, "best_formula", lambda *_: None)
     ended = outcome.outcome_of(searched, predictor(), NOMINAL, lambda _: None)
     assert ended.unseen is not counts
@@ -293,8 +298,8 @@ def test_of_several_effects_only_those_that_raise_the_error_are_withdrawn(monkey
         at = SimpleNamespace(models=[SimpleNamespace(rms_m=1.0), SimpleNamespace(rms_m=ratio)])
         return SimpleNamespace(falls=ratio < 0.5, horizons={1.0: at})
 
-    monkeypatch.setattr(outcome, "errors_before_and_after", judged)
-    stands = outcome._standing(searched, predictor(), NOMINAL, lambda _: None)
+    monkeypatch.setattr(standing, "errors_before_and_after", judged)
+    stands = standing.standing_of(searched, predictor(), NOMINAL, lambda _: None)
     assert stands.selection.accepted == ("wheelbase", "clock-offset")
     assert stands.withdrawn == ("wheel-mismatch",)
 
@@ -328,7 +333,7 @@ def test_an_effect_that_only_the_error_of_the_heading_shows_is_said(without, see
     exact = {name: {**judged.of(name), 2.0: SimpleNamespace(rms_m=0.0, heading_rad=0.0, median_m=0.0)} for name in ("one", "all")}
     two = SimpleNamespace(of=exact.get, horizons=dict.fromkeys((horizon, 2.0), judged.horizons[horizon]))
     assert seen_in_heading(two, ["one"]) == found  # no heading is off where no pose is
-    words = list(caveats._on_heading({name: ("trial", *two) for name, (_, *two) in found.items()}))
+    words = list(effect_caveats.on_heading({name: ("trial", *two) for name, (_, *two) in found.items()}))
     assert words == ["one lowers the error of the heading (over the whole trial from 2.5e+02 to 1e+02 mrad), and no error of "
                      "position by 2% or more."] * seen  # fmt: skip
 
@@ -367,7 +372,7 @@ def test_numbers_that_what_is_negligible_moves_are_said():
         found = SimpleNamespace(
             selection=SimpleNamespace(fit=fit_of(now)), beside_negligible=numbers, negligible={"slope-load": {}}
         )
-        return list(caveats._on_moved(found))
+        return list(effect_caveats.on_moved(found))
 
     said = "With slope-load in the model, the parameters of floor-slope differ: x_m_s = 0.004 m/s, not 0.0045."
     assert notes(0.0045, 0.004) == [said]
@@ -477,6 +482,6 @@ def test_what_no_error_shows_is_kept_for_the_numbers_that_would_shift(monkeypatc
     assert gain.of(lacking) == 1.0
     kept = {"speed-gain": (Shift("dead-zone", "width_m_s", "m/s", 5e-3, 6.5e-3),)}
     assert negligible_and_errors(selection) == ((), "errors", kept)
-    (said,) = caveats._on_kept(kept)
+    (said,) = effect_caveats.on_kept(kept)
     assert said.startswith("speed-gain is certain, but without it no error on held-out trials is higher by 2% or more.")
     assert "without it width_m_s of dead-zone would be 0.0065 m/s instead of 0.005: measure one of these" in said

@@ -7,15 +7,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.diagnose import diagnosis
+from bns.diagnose import diagnosing
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import _from_better_numbers, diagnose
+from bns.diagnose.diagnosing import _from_better_numbers, diagnose
 from bns.diagnose.estimate.plausibility import implausible
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_with, listed
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.residuals import established as curves
-from bns.diagnose.residuals.established import curve_does_better
+from bns.diagnose.residuals import earned_terms as curves
+from bns.diagnose.residuals.earned_terms import curve_does_better
+from bns.diagnose.select.acceptance import Acceptance
 from bns.diagnose.select.result import SelectionResult, SelectionStep
 from bns.diagnose.select.stepwise import StepwiseSelection
 from bns.physics.decoys import DECOYS
@@ -127,7 +128,7 @@ def test_a_few_late_trials_do_not_bring_a_clock_in_by_exchange(late, stays):
     problem, fit = search._refit_with_noise(NOMINAL)
     tried = fit_with(problem, fit, search.catalogue["clock-offset"])
     assert tried.held_out.sum() < fit.held_out.sum() - 0.5
-    assert search._may_stay(problem, tried, "clock-offset") is stays
+    assert search._acceptance.may_stay(problem, tried, "clock-offset") is stays
 
 
 def test_numbers_that_are_known_are_one_start_more(monkeypatch):
@@ -161,7 +162,7 @@ def test_what_asks_for_too_much_once_noise_and_numbers_have_settled_is_passed_ov
     def rejected_because(fit, name, bounds=True):
         return "too much" if name == "wheelbase" and not bounds else implausible(fit, name, bounds)
 
-    monkeypatch.setattr(StepwiseSelection, "_rejected", lambda _, fit, name, bounds=True: rejected_because(fit, name, bounds))
+    monkeypatch.setattr(Acceptance, "rejected", lambda _, fit, name, bounds=True: rejected_because(fit, name, bounds))
     tracks = tracks_of(measured(hidden(wheelbase={"factor": 1.05}), trials=12, seed=11))
     found = StepwiseSelection(WheelPredictor(tracks), NOMINAL).run()
     first = found.steps[0].ranking[0]
@@ -187,7 +188,7 @@ def test_the_newest_is_dropped_where_an_exchange_left_it_nothing_to_do():
     search = StepwiseSelection(predictor, NOMINAL)
     idle = NOMINAL.with_effect("command-delay", delay_s=0.0)
     problem = problem_for(predictor, idle)
-    assert search._backward_step(problem, problem.fit(idle, 0), ("command-delay",))[2] == ()
+    assert search._look_back.backward_step(problem, problem.fit(idle, 0), ("command-delay",))[2] == ()
 
 
 def test_the_same_effects_take_the_numbers_that_fit_better():
@@ -244,7 +245,7 @@ def test_an_end_does_not_stand_where_an_effect_would_go_come_or_be_exchanged(wit
     assert searched(two).stands(ended("speed-gain")) is None
     assert searched(table).stands(replace(end, accepted=())) is None
     exchanging = searched(table)
-    monkeypatch.setattr(exchanging, "_exchange_step", lambda problem, fit, _: (problem, fit, ("warm-up",)))
+    monkeypatch.setattr(exchanging._look_back, "exchange_step", lambda problem, fit, _: (problem, fit, ("warm-up",)))
     assert exchanging.stands(end) is None
 
 
@@ -276,7 +277,7 @@ def test_what_could_stand_in_place_of_the_newest_effect_is_known_from_the_round_
         ({"losses": 1e4}, False),  # nothing beside what is lost anyway
         ({"rejected_because": "at its bound"}, False),
         ({"accepted": ("wheelbase",)}, False),
-        ({"trials": diagnosis.FEW_TRIALS}, False),
+        ({"trials": diagnosing.FEW_TRIALS}, False),
         ({"unexplained": True}, False),
     ],
 )
@@ -288,7 +289,7 @@ def test_a_sign_is_worth_more_trials_only_where_few_nearly_sufficed(change, hint
     candidate = SimpleNamespace(name="turn-slip", rejected_because=given["rejected_because"], paired_comparison=earned)
     nominal = SimpleNamespace(losses=np.full(12, given["losses"]))
     found = SimpleNamespace(accepted=given["accepted"], steps=(SelectionStep((candidate,), 0.5, ""),), nominal=nominal)
-    assert (diagnosis._hint(found, given["trials"], unexplained=given["unexplained"]) is candidate) is hinted
+    assert (diagnosing._hint(found, given["trials"], unexplained=given["unexplained"]) is candidate) is hinted
 
 
 @pytest.mark.parametrize("better", [(False,), (True, True, True), (True, False)])
@@ -297,7 +298,7 @@ def test_beside_several_effects_the_search_ends_where_a_curve_does_better(monkey
 
     But a curve that does better than the next effect has to do better than all that would follow it, too.
     """
-    monkeypatch.setattr("bns.diagnose.select.stepwise.CURVE_FROM", 1)
+    monkeypatch.setattr("bns.diagnose.select.forwards.CURVE_FROM", 1)
     asked = []
 
     def curve_does_better(problem, fit, added):
@@ -325,8 +326,8 @@ def test_beside_several_effects_the_search_ends_where_a_curve_does_better(monkey
 @pytest.mark.parametrize("names", [("wheelbase",), ("wheelbase", "motor-lag"), ("wheelbase", "motor-lag", "side-slip")])
 @pytest.mark.parametrize("unlisted", [False, True])
 def test_curves_do_better_only_than_effects_that_are_not_there(monkeypatch, unlisted, names):
-    asked, better_term = [], curves._better_term
-    monkeypatch.setattr(curves, "_better_term", lambda *which: asked.append(which) or better_term(*which))
+    asked, better_term = [], curves.better_term
+    monkeypatch.setattr(curves, "better_term", lambda *which: asked.append(which) or better_term(*which))
     true = hidden(wheelbase={"factor": 1.05}, motor_lag={"tau_s": 0.15}, side_slip={"slip_s": 0.1})
     if unlisted:
         true = NOMINAL.with_active(formula_effect("rough", "k * exp(-tau / 2)", "share"), (-0.15,))
@@ -370,7 +371,7 @@ def test_a_bold_search_is_another_one(with_a_gain):
     predictor, others = WheelPredictor(tracks_of(with_a_gain[0])), set(all_effects()) - {"speed-gain", "motor-lag"}
     search = StepwiseSelection(predictor, NOMINAL, barred=others)
     found = search.run()
-    search._all_believed = True
+    search._acceptance.all_believed = True
     assert search._run() is not found
     assert search._plain is found
 
@@ -404,5 +405,5 @@ def test_a_search_looks_ahead_to_all_effects_that_would_come_in():
     others = set(all_effects()) - {"speed-gain", "wheelbase", "motor-lag", "camera-rotation"}
     search = StepwiseSelection(predictor, NOMINAL, barred=others)
     problem, fit = search._refit_with_noise(NOMINAL.with_effect("speed-gain", gain=0.95))
-    ahead = search._looked_ahead(problem, fit, ("speed-gain",))
+    ahead = search._forwards._looked_ahead(problem, fit, ("speed-gain",))
     assert {active.effect.name for active in ahead.effects} == {"speed-gain", "wheelbase", "motor-lag"}

@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from bns.diagnose import caveats
+from bns.diagnose import effect_caveats
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.diagnosing import diagnose
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.select import variants
@@ -66,7 +66,7 @@ def test_a_diagnosis_says_so():
 @pytest.mark.parametrize(("terms", "said"), [((), 1), (("unlisted",), 0)])
 def test_with_terms_which_change_the_numbers_it_is_not_said(monkeypatch, terms, said):
     asked = []
-    monkeypatch.setattr(caveats, "uncertain_variants", lambda selection: asked.append(selection) or [])
-    monkeypatch.setattr(caveats, "order_of_friction", lambda selection: "")
-    assert list(caveats._on_place(SimpleNamespace(selection=None, terms=terms))) == []
+    monkeypatch.setattr(effect_caveats, "uncertain_variants", lambda selection: asked.append(selection) or [])
+    monkeypatch.setattr(effect_caveats, "order_of_friction", lambda selection: "")
+    assert list(effect_caveats.on_place(SimpleNamespace(selection=None, terms=terms))) == []
     assert len(asked) == said

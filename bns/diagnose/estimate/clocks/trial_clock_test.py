@@ -12,7 +12,8 @@ import numpy as np
 
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.estimate.clocks.trial_clocks import with_fitted_clocks
-from bns.diagnose.estimate.fit import Fit, Problem
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.noise import Whitening, huber
 from bns.diagnose.estimate.significance import PairedComparison, paired_elpd_diff, sign_flip_p
 from bns.diagnose.estimate.starts import fit_with

@@ -1,0 +1,64 @@
+"""Whether an effect is taken into a model, and whether it stays: what it earns on held-out trials, and if it can be believed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fitting import Problem
+from bns.diagnose.estimate.plausibility import at_bound, implausible, undetermined
+from bns.diagnose.select.extending import extended, fits_better, reduced, variant
+from bns.diagnose.select.negligible import certainly_better
+from bns.diagnose.select.result import Candidate
+from bns.diagnose.settings import DEFAULTS
+from bns.physics.effect import Effect
+
+MIN_GAIN = DEFAULTS.select.min_gain
+
+
+class Acceptance:
+    """What is asked of an effect of ``catalogue``; ``level``: the chance of a false alarm, ``least_z``: in standard errors.
+
+    ``all_believed``: whether numbers beyond what is plausible are taken as well; a search may change it.
+    """
+
+    def __init__(self, catalogue: Mapping[str, Effect], level: float, least_z: float) -> None:
+        self._catalogue, self._level, self._least_z = catalogue, level, least_z
+        self.all_believed = False
+
+    def candidate(self, problem: Problem, fit: Fit, added: Fit, name: str) -> Candidate:
+        """An effect added to a model, with what it earns and why it may not be taken."""
+        return Candidate(name, added, problem.paired_comparison(fit, added), self.rejected(added, name))
+
+    def rejected(self, fit: Fit, name: str, bounds: bool = True) -> str:
+        """Why an effect may not be taken; where all numbers are believed, only for one at a bound or not determined."""
+        why = implausible(fit, name, bounds)
+        believed = self.all_believed and not at_bound(fit, name)
+        return undetermined(fit, name) or ("" if believed else why)
+
+    def earned(self, candidate: Candidate, before: Fit, decoy_threshold: float) -> bool:
+        """Whether what a candidate gains over the fit before is certain, enough, and more than a decoy gains."""
+        e = candidate.paired_comparison
+        least = MIN_GAIN * float(before.held_out.mean())
+        return e.p_value < self._level and e.z > self._least_z and e.elpd_diff > max(decoy_threshold, least)
+
+    def earned_over(self, problem: Problem, lacking: Fit, fit: Fit, name: str) -> bool:
+        """Whether an effect of a fit has `earned` its place over the fit that lacks it."""
+        return self.earned(Candidate(name, fit, problem.paired_comparison(lacking, fit)), lacking, 0.0)
+
+    def may_stay(self, problem: Problem, fit: Fit, name: str) -> bool:
+        """Whether that effect of a fit would be taken as a newcomer: few trials that gain much do not bring one in."""
+        simpler = reduced(self._catalogue, problem, fit, name)
+        return not self.rejected(fit, name) and self.earned_over(problem, simpler, fit, name)
+
+    def stays(self, problem: Problem, simpler: Fit, fit: Fit, name: str) -> bool:
+        """Whether an effect still earns its place; one that only acts elsewhere than the simpler one, by the better fit."""
+        return fits_better(simpler, fit) if variant(self._catalogue, name) else self.earned_over(problem, simpler, fit, name)
+
+    def needed(self, problem: Problem, fit: Fit, name: str) -> bool:
+        """Is the error certainly lower with an effect that extends another than with that other?"""
+        return certainly_better((problem, reduced(self._catalogue, problem, fit, name)), (problem, fit))
+
+    def better_than_part(self, problem: Problem, fit: Fit, name: str) -> bool:
+        """Whether an effect that extends another is `needed`, as it must be to remain; any other effect is no part's rival."""
+        return not extended(self._catalogue, name) or self.needed(problem, fit, name)
