@@ -84,7 +84,7 @@ def notes_on(
     yield from on_moved(found)
     yield from on_kept(found.kept_for)
     yield from on_heading(found.seen_in_heading)
-    yield from on_effects(selection, tracks, found.imitating)
+    yield from on_effects(selection, tracks, found.imitating, not (found.rest.any or found.terms))
     yield from single_wheel(found.terms[0].fit if _described(found) else selection.fit)  # the numbers that are shown
     yield from on_the_cone(selection.fit.model)
     for names in longer:

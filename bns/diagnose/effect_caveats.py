@@ -31,8 +31,13 @@ CHANCE = DEFAULTS.residuals.chance
 FEWEST_CLOCKS = DEFAULTS.verdict.fewest_clocks
 
 
-def on_effects(selection: SelectionResult, tracks: Tracks, imitating: Sequence[str] = ()) -> Iterator[str]:
-    """What each of the accepted and competing effects calls for; what those take for granted that were ``imitating``."""
+def on_effects(
+    selection: SelectionResult, tracks: Tracks, imitating: Sequence[str] = (), all_explained: bool = True
+) -> Iterator[str]:
+    """What each of the accepted and competing effects calls for; what those take for granted that were ``imitating``.
+
+    ``all_explained``: nothing that no listed effect explains is left.
+    """
     names = {*selection.accepted, *(name for competitor in selection.competing_models for name in competitor)}
     known = known_effects(selection)
     tied = {name for group in ties_of(selection) for name in group if not all(known[one].of_measuring for one in group)}
@@ -48,7 +53,7 @@ def on_effects(selection: SelectionResult, tracks: Tracks, imitating: Sequence[s
     assuming = [*chain, *(known[name] for name in imitating if name in known)]
     yield from (effect.assumes for effect in assuming if effect.assumes)
     tracker = smoothing_tracker(selection.problem, selection.fit) if names.intersection(LATE) else None
-    yield from [tracker.in_words] if tracker is not None and tracker.in_words else []
+    yield from filter(None, [tracker.in_words(all_explained) if tracker is not None else ""])
     yield from (text for effect in chain for other, text in effect.beside.items() if other in names)
     yield from (_on_numbers(known[name]) for name in selection.accepted if known_together(selection.fit, name))
     yield from _on_stamps(tracks, names)
@@ -194,7 +199,15 @@ def on_kept(kept_for: Mapping[str, Sequence[Shift]]) -> Iterator[str]:
 def on_heading(seen: Mapping[str, tuple[str, float, float]]) -> Iterator[str]:
     """Effects for which the table of errors, which is of positions, has no reason."""
     for name, (horizon, without, having) in seen.items():
+        before, after = _apart(1e3 * without, 1e3 * having)
         yield (
-            f"{name} lowers the error of the heading (over {IN_WORDS[horizon]} from {1e3 * without:.2g} to {1e3 * having:.2g} "
-            f"mrad), and no error of position by {LEAST_FALL:.0%} or more."
+            f"{name} lowers the error of the heading (over {IN_WORDS[horizon]} from {before} to {after} mrad), and no error of "
+            f"position by {LEAST_FALL:.0%} or more."
         )
+
+
+def _apart(one: float, other: float) -> tuple[str, str]:
+    """Two numbers with as few digits as tell them apart, two at least, and all before the point."""
+    whole = len(str(int(max(one, other))))
+    written = [(f"{one:.{digits}g}", f"{other:.{digits}g}") for digits in range(max(2, whole), whole + 6)]
+    return next((pair for pair in written if pair[0] != pair[1]), written[0])

@@ -78,6 +78,16 @@ class Wheels:
     right_m_s: Array
     wheelbase_m: float
     conditions: Conditions = NO_CONDITIONS
+    followed: Array | None = None
+    """From 0 to 1: where wheels follow their commands late, what acts only while the robot moves comes and goes as late, within a
+    step as well. None: they do not."""
+
+    @property
+    def moving(self) -> Array:
+        """From 0 (wheels at rest) to 1, the mean over each step."""
+        fastest = np.maximum(np.abs(self.left_m_s), np.abs(self.right_m_s))
+        out: Array = np.minimum(fastest / CREEP_M_S, 1.0 if self.followed is None else self.followed)
+        return out
 
     @property
     def session_s(self) -> Array:
@@ -109,6 +119,10 @@ class Wheels:
     def turning(self, left_m_s: Array, right_m_s: Array) -> Wheels:
         """The same with other speeds."""
         return replace(self, left_m_s=left_m_s, right_m_s=right_m_s)
+
+    def following(self, left_m_s: Array, right_m_s: Array, late: Callable[[Array], Array]) -> Wheels:
+        """The same with speeds that follow those of before; ``late`` makes (batch, steps) as late."""
+        return replace(self, left_m_s=left_m_s, right_m_s=right_m_s, followed=late(self.moving))
 
 
 @dataclass(frozen=True)

@@ -208,7 +208,8 @@ def test_a_lag_is_said_to_be_perhaps_the_trackers(monkeypatch, accepted, said):
     fit = SimpleNamespace(model=model, free=())
     selection = SimpleNamespace(accepted=accepted, competing_models=(), steps=(), problem=None, fit=fit)
     tracks = SimpleNamespace(extra={}, start_known=False, commands_at_poses_s=None, timed=False)
-    assert sum(note == found.in_words for note in on_effects(selection, tracks)) == said
+    assert sum(note == found.in_words() for note in on_effects(selection, tracks)) == said
+    assert sum(note == found.in_words(False) for note in on_effects(selection, tracks, all_explained=False)) == said
 
 
 @pytest.mark.parametrize(("rate", "scatter_s", "said"), [(1e-4, 5e-3, True), (0.0, 5e-3, False), (1e-4, 0.5, False)])

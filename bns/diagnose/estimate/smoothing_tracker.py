@@ -38,9 +38,11 @@ class SmoothingTracker:
     z: float
     instead_of: tuple[str, ...] = (LAG,)
 
-    @property
-    def in_words(self) -> str:
-        """What to say of a lag that was found; "" where the tracks speak for it."""
+    def in_words(self, all_explained: bool = True) -> str:
+        """What to say of a lag that was found; "" where the tracks speak for it.
+
+        Where something is left unexplained, a better fit says little: the one that happens to imitate the rest has it.
+        """
         if self.z < -MIN_Z:
             return ""
         effects = " and ".join(self.instead_of)
@@ -48,6 +50,10 @@ class SmoothingTracker:
         others = "these effects" if len(self.instead_of) > 1 else alone
         tracker = f"a tracker that smooths its poses (a low-pass filter with a time constant of {1e3 * self.tau_s:.0f} ms)"
         known = "Ask whether yours does, and compare with raw poses or with the wheels' own speeds."
+        if self.z > MIN_Z and not all_explained:
+            return (
+                f"{effects}: {tracker} may do the work of {others}, as far as what is left unexplained lets one tell. {known}"
+            )
         if self.z <= MIN_Z:
             return f"{effects}: {tracker} fits this log as well as {others}. {known}"
         return (

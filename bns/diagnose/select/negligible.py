@@ -18,11 +18,13 @@ from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.lacking import fit_without
 from bns.diagnose.estimate.parameters import FreeParameter
+from bns.diagnose.estimate.significance import paired_elpd_diff
 from bns.diagnose.predict.paired_errors import HorizonErrors, PairedErrors, paired_errors
 from bns.diagnose.select.result import SelectionResult
 from bns.diagnose.settings import DEFAULTS
 
 LEAST_FALL = DEFAULTS.select.least_fall
+NEARLY = DEFAULTS.select.tie_nearly
 LUCK = DEFAULTS.select.least_fall_luck
 MEDIAN_OF = DEFAULTS.select.least_fall_windows
 LEAST_SHIFT = DEFAULTS.select.least_shift
@@ -112,6 +114,18 @@ def certainly_better(lacking: tuple[Problem, Fit], having: tuple[Problem, Fit]) 
         for name, (problem, fit) in (("lacking", lacking), (_ALL, having))
     ]
     return fall_matters(paired_errors(predictor, steps), "lacking", _ALL)
+
+
+def negligibly_worse(problem: Problem, tried: Fit, fit: Fit, without: Fit) -> bool:
+    """Does ``tried`` nearly all that ``fit`` does (`tie_nearly`), and shows no held-out error what it lacks (`least_fall`)?
+
+    ``without``: neither has been added. A lag of 6 ms and a delay of 6 ms differ within one frame of a camera. What a robot's
+    controller does in that time is neither, and the one that happens to be nearer is not therefore the true one.
+    """
+    worth, lost = (paired_elpd_diff(other.held_out, fit.held_out)[0] for other in (without, tried))
+    if len(tried.free) > len(fit.free) or lost > NEARLY * worth:
+        return False
+    return _largest_fall(_errors_of(problem, {"tried": tried, _ALL: fit}), "tried", _ALL) < LEAST_FALL
 
 
 def shifted(having: Fit, lacking: Fit, effects: Collection[str]) -> tuple[FreeParameter, ...]:

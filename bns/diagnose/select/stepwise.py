@@ -31,6 +31,7 @@ from bns.diagnose.select.extending import fits_better, reduced
 from bns.diagnose.select.forwards import Forwards
 from bns.diagnose.select.indistinguishable import indistinguishable
 from bns.diagnose.select.look_back import LookBack
+from bns.diagnose.select.negligible import negligibly_worse
 from bns.diagnose.select.result import Candidate, SelectionResult, SelectionStep, predicts_better
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect
@@ -224,7 +225,7 @@ class StepwiseSelection:
     def _competing_models(
         self, problem: Problem, fit: Fit, accepted: tuple[str, ...]
     ) -> list[tuple[tuple[str, ...], Fit]]:
-        """Explanations of the same size, one effect exchanged, that these tracks cannot tell from the accepted one.
+        """Explanations of the same size, one effect exchanged, which these tracks, or errors, cannot tell from it.
 
         What comes in must have earned its place: where trials disagree, much that earns nothing certain is no worse for certain.
         Nor may one with more numbers have one that may be anything: a warm-up of any length at all is a gain. Where a number is
@@ -240,7 +241,8 @@ class StepwiseSelection:
                 problem, lacking(name), tried, other
             )
             model = believable(tried, other) if may else None
-            if may and indistinguishable(tried if model is None else problem.fit(model), fit, lacking(name)):
+            rival = tried if model is None else problem.fit(model)
+            if may and (indistinguishable(rival, fit, lacking(name)) or negligibly_worse(problem, rival, fit, lacking(name))):
                 competing_models.append((tuple(other if a == name else a for a in accepted), tried))
         return competing_models
 

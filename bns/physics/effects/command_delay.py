@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from bns.physics.effect import Effect, Parameter
-from bns.physics.signals import Wheels
+from bns.physics.signals import Array, Wheels
 from bns.physics.wheels.scans import delayed
 
 
@@ -15,11 +13,11 @@ def apply(wheels: Wheels, delay_s: float) -> Wheels:
     Where tracks are followed steps are long, and what a lag did before varies within them.
     """
     varying = wheels.conditions.seen is not None
-    return replace(
-        wheels,
-        left_m_s=delayed(wheels.left_m_s, wheels.step_s, delay_s, varying),
-        right_m_s=delayed(wheels.right_m_s, wheels.step_s, delay_s, varying),
-    )
+
+    def late(values: Array) -> Array:
+        return delayed(values, wheels.step_s, delay_s, varying)
+
+    return wheels.following(late(wheels.left_m_s), late(wheels.right_m_s), late)
 
 
 EFFECT = Effect(

@@ -8,15 +8,19 @@ disc as wide as the wheelbase, and less for a load near the centre. At 1 each wh
 from __future__ import annotations
 
 from bns.physics.effect import Effect, Parameter
-from bns.physics.signals import Wheels
+from bns.physics.signals import Array, Wheels
 from bns.physics.wheels.scans import first_order
 
 
 def apply(wheels: Wheels, tau_s: float, turn_ratio: float) -> Wheels:
     """First-order lag of the wheels' mean by ``tau_s``, and of their difference by ``turn_ratio`` times that, from rest."""
-    mean = first_order((wheels.left_m_s + wheels.right_m_s) / 2, wheels.step_s, tau_s)
-    half = first_order((wheels.right_m_s - wheels.left_m_s) / 2, wheels.step_s, tau_s * turn_ratio)
-    return wheels.turning(mean - half, mean + half)
+
+    def late(values: Array, by_s: float = tau_s) -> Array:
+        return first_order(values, wheels.step_s, by_s)
+
+    mean = late((wheels.left_m_s + wheels.right_m_s) / 2)
+    half = late((wheels.right_m_s - wheels.left_m_s) / 2, tau_s * turn_ratio)
+    return wheels.following(mean - half, mean + half, late)
 
 
 EFFECT = Effect(

@@ -5,21 +5,19 @@ So does a worn gearbox, a motor of another make, or a controller that was tuned 
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from bns.physics.effect import Effect, Parameter
-from bns.physics.signals import Wheels
+from bns.physics.signals import Array, Wheels
 from bns.physics.wheels.scans import first_order
 
 
 def apply(wheels: Wheels, tau_s: float, ratio: float) -> Wheels:
     """First-order lags from rest, left by 2·tau/(1 + ratio), right by ``ratio`` times that: their mean is ``tau_s``."""
     left_s = 2.0 * tau_s / (1.0 + ratio)
-    return replace(
-        wheels,
-        left_m_s=first_order(wheels.left_m_s, wheels.step_s, left_s),
-        right_m_s=first_order(wheels.right_m_s, wheels.step_s, left_s * ratio),
-    )
+
+    def late(values: Array, by_s: float = tau_s) -> Array:
+        return first_order(values, wheels.step_s, by_s)
+
+    return wheels.following(late(wheels.left_m_s, left_s), late(wheels.right_m_s, left_s * ratio), late)
 
 
 EFFECT = Effect(

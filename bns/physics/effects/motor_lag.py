@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from bns.physics.effect import Effect, Parameter
-from bns.physics.signals import Wheels
+from bns.physics.signals import Array, Wheels
 from bns.physics.wheels.scans import first_order
 
 
 def apply(wheels: Wheels, tau_s: float) -> Wheels:
     """First-order lag of each wheel, from rest."""
-    return replace(
-        wheels,
-        left_m_s=first_order(wheels.left_m_s, wheels.step_s, tau_s),
-        right_m_s=first_order(wheels.right_m_s, wheels.step_s, tau_s),
-    )
+
+    def late(values: Array) -> Array:
+        return first_order(values, wheels.step_s, tau_s)
+
+    return wheels.following(late(wheels.left_m_s), late(wheels.right_m_s), late)
 
 
 EFFECT = Effect(

@@ -168,7 +168,7 @@ def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
     if wheels.conditions.seen is None:
         return ()
     chosen = np.unique(np.linspace(0, len(wheels.step_s) - 1, min(len(wheels.step_s), _TRIALS)).astype(int))
-    some = replace(wheels, **{n: getattr(wheels, n)[chosen] for n in ("step_s", "left_m_s", "right_m_s")})
+    some = replace(wheels, followed=None, **{n: getattr(wheels, n)[chosen] for n in ("step_s", "left_m_s", "right_m_s")})
     heading = wheels.conditions.seen[chosen, :, 2]
     turns = np.geomspace(*_RANGE, _TURNS) * wheels.wheelbase_m
     found = [_explained(some, heading, turn) for turn in turns]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bns.physics.model import Model
-from bns.physics.signals import CREEP_M_S, NO_CONDITIONS, Array, Body, Conditions, Flow, Wheels
+from bns.physics.signals import NO_CONDITIONS, Array, Body, Conditions, Flow, Wheels
 from bns.physics.wheels.grid import Grid
 
 
@@ -70,12 +70,11 @@ def arcs(body: Body, step_s: Array, heading_rad: Array) -> Arcs:
 
 def _body(wheels: Wheels) -> Body:
     left, right = wheels.left_m_s, wheels.right_m_s
-    moving = np.minimum(np.maximum(np.abs(left), np.abs(right)) / CREEP_M_S, 1.0)
     return Body(
         forward_m_s=(left + right) / 2.0,
         sideways_m_s=np.zeros_like(left),
         yaw_rad_s=(right - left) / wheels.wheelbase_m,
-        moving=moving,
+        moving=wheels.moving,
         left_m_s=left,
         right_m_s=right,
         session_s=wheels.session_s,

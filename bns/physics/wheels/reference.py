@@ -55,7 +55,7 @@ def simulate_slowly(
     ends = np.cumsum(duration_s)
     delay = model.values_of("command-delay")["delay_s"]
     corners = sorted({0.0, *ends, *(t + delay for t in (0.0, *ends) if t + delay < ends[-1])})
-    state, poses = np.array([*start, 0.0, 0.0, 0.0, 0.0]), {0.0: np.array(start)}
+    state, poses = np.array([*start, *np.zeros(5)]), {0.0: np.array(start)}
     for t0, t1 in pairwise(corners):
         index = int(np.searchsorted(ends, (t0 + t1) / 2 - delay))
         begun = (t0 + t1) / 2 > delay
@@ -98,17 +98,24 @@ def _told(model: Model, left: float, right: float) -> tuple[float, float]:
 
 
 def _rates(model: Model, state: Array, target: tuple[float, float], wheels: Array) -> list[float]:
-    """Time derivative of x, y, heading, what a rate limit lets through (2), lagging wheels (2)."""
+    """Time derivative of x, y, heading, what a rate limit lets through (2), lagging wheels (2), whether they move, as late."""
     tau, limit = model.values_of("motor-lag")["tau_s"], model.values_of("acceleration-limit")["max_m_s2"]
     limited = [max(-limit, min(limit, (u - w) / _CATCH_UP_S)) for u, w in zip(target, state[3:5], strict=True)]
     lagging = [(u - w) / tau if tau > 0 else 0.0 for u, w in zip(state[3:5], state[5:7], strict=True)]
-    return [*_velocity(model, state, wheels[0], wheels[1]), *limited, *lagging]
+    moves = (_moving(*state[3:5]) - state[7]) / tau if tau > 0 else 0.0
+    followed = float(state[7]) if tau > 0 else 1.0
+    return [*_velocity(model, state, wheels[0], wheels[1], followed), *limited, *lagging, moves]
 
 
-def _velocity(model: Model, state: Array, left: float, right: float) -> tuple[float, float, float]:
+def _moving(left: float, right: float) -> float:
+    """From 0 (at rest) to 1."""
+    return min(max(abs(left), abs(right)) / CREEP_M_S, 1.0)
+
+
+def _velocity(model: Model, state: Array, left: float, right: float, followed: float) -> tuple[float, float, float]:
     x, y, heading = state[:3]
     slope, tether = model.values_of("floor-slope"), model.values_of("tether-pull")
-    moving = min(max(abs(left), abs(right)) / CREEP_M_S, 1.0)
+    moving = min(_moving(left, right), followed)
     omega = (right - left) / (model.wheelbase_m * model.values_of("wheelbase")["factor"])
     v = (left + right) / 2 * max(1 - model.values_of("turn-slip")["slip_s"] * abs(omega), 0.0)
     rightwards = model.values_of("side-slip")["slip_s"] * v * omega

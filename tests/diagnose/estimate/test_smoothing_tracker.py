@@ -1,6 +1,7 @@
 """A lag of the motors and a tracker that smooths: made by plain integration and by scipy's filter, not by this package."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -60,26 +61,26 @@ def test_a_tracker_that_smooths_is_told_from_motors_that_lag_and_its_time_consta
     found = alternative(log(tracker_s=TAU_S))
     assert found.tau_s == pytest.approx(TAU_S, rel=0.03)
     assert found.z > 4
-    assert re.match(r"motor-lag: a tracker that smooths .* of 1[12]\d ms\) fits this log better than motors", found.in_words)
-    assert f"by {found.z:.1f} standard errors" in found.in_words
+    assert re.match(r"motor-lag: a tracker that smooths .* of 1[12]\d ms\) fits this log better than motors", found.in_words())
+    assert f"by {found.z:.1f} standard errors" in found.in_words()
 
 
 def test_motors_that_lag_are_told_from_a_tracker_that_smooths():
     found = alternative(log(motors_s=TAU_S))
     assert found.z < -4
-    assert found.in_words == ""
+    assert found.in_words() == ""
 
 
 def test_on_straight_lines_nothing_tells_the_two_apart():
     found = alternative(log(motors_s=TAU_S, turning=0.0))
     assert abs(found.z) < 3
-    assert "fits this log as well as motors that lag. Ask whether" in found.in_words
+    assert "fits this log as well as motors that lag. Ask whether" in found.in_words()
 
 
 def test_effects_that_do_what_a_filter_does_in_curves_are_named_with_the_lag():
     of_three = SmoothingTracker(0.15, 1.0, (LAG, "turn-slip-quadratic", "clock-offset"))
     said = "motor-lag and turn-slip-quadratic and clock-offset: a tracker .* of 150 ms\\) fits this log as well as these effects"
-    assert re.match(said, of_three.in_words)
+    assert re.match(said, of_three.in_words())
 
 
 def test_what_stands_beside_the_lag_for_curves_goes_with_it():
@@ -97,7 +98,10 @@ def test_a_filter_is_told_from_a_late_clock_that_was_named_in_its_place():
     assert found.instead_of == ("clock-offset",)
     assert found.tau_s == pytest.approx(TAU_S, rel=0.05)
     assert found.z > 4
-    assert "fits this log better than this effect, by" in found.in_words
+    assert "fits this log better than this effect, by" in found.in_words()
+    left = found.in_words(all_explained=False)
+    assert "may do the work of this effect, as far as what is left unexplained lets one tell. Ask whether" in left
+    assert replace(found, z=0.0).in_words(all_explained=False) == replace(found, z=0.0).in_words()
 
 
 def test_a_model_without_a_lag_has_no_alternative():

@@ -79,7 +79,10 @@ def test_it_is_said_where_it_makes_the_error_and_the_error_is_above_noise():
     (said,) = scatter_in_words(predictor, NOISE, errors(1.7 * by_drive))  # something else makes most of it
     assert f"({1.7e3 * by_drive:.3g} mm) is far above tracking noise (2 mm)" in said
     assert f"makes only {1e3 * by_drive:.3g} mm. In the rest no listed effect" in said
-    assert scatter_in_words(predictor, NOISE, errors(0.6 * by_drive)) == []  # it scatters in another way
+    (said,) = scatter_in_words(predictor, NOISE, errors(0.6 * by_drive))  # from pose to pose more, and it goes back
+    assert f"({0.6e3 * by_drive:.3g} mm) is far above tracking noise (2 mm)" in said
+    assert f"would be {1e3 * by_drive:.3g} mm off. So these jumps take one another back" in said
+    assert scatter_in_words(predictor, NOISE, errors(0.6 * by_drive, floor_m=0.5 * by_drive)) == []
     assert scatter_in_words(predictor, NOISE, errors(by_drive, floor_m=0.6 * by_drive)) == []  # near noise: no question
     assert scatter_in_words(predictor, NOISE, errors(by_drive, floor_m=np.nan)) == []
     assert scatter_in_words(predictor, NOISE, SimpleNamespace(horizons={})) == []

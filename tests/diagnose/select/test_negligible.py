@@ -333,8 +333,10 @@ def test_an_effect_that_only_the_error_of_the_heading_shows_is_said(without, see
     exact = {name: {**judged.of(name), 2.0: SimpleNamespace(rms_m=0.0, heading_rad=0.0, median_m=0.0)} for name in ("one", "all")}
     two = SimpleNamespace(of=exact.get, horizons=dict.fromkeys((horizon, 2.0), judged.horizons[horizon]))
     assert seen_in_heading(two, ["one"]) == found  # no heading is off where no pose is
+    near = list(effect_caveats.on_heading({"lag": ("command", 0.01149, 0.01102)}))
+    assert "from 11.5 to 11 mrad" in near[0]  # two digits would say from 11 to 11
     words = list(effect_caveats.on_heading({name: ("trial", *two) for name, (_, *two) in found.items()}))
-    assert words == ["one lowers the error of the heading (over the whole trial from 2.5e+02 to 1e+02 mrad), and no error of "
+    assert words == ["one lowers the error of the heading (over the whole trial from 250 to 100 mrad), and no error of "
                      "position by 2% or more."] * seen  # fmt: skip
 
 

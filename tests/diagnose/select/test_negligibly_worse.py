@@ -1,0 +1,95 @@
+"""An explanation that does nearly as much as the accepted one, and that no error speaks against, is part of the tie."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.predict.paired_errors import HorizonErrors, ModelError, PairedErrors
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.select import negligible
+from bns.diagnose.select.negligible import LEAST_FALL, NEARLY, negligibly_worse
+from bns.physics.model import Model
+
+FIT = SimpleNamespace(held_out=np.arange(60.0), free=("a",))
+WITHOUT = SimpleNamespace(held_out=FIT.held_out + 100.0, free=())
+WINDOWS = 10**8
+"""So many that no luck is left."""
+
+
+def losing(share, free=("b",)):
+    return SimpleNamespace(held_out=FIT.held_out + 100.0 * share, free=free)
+
+
+def worse(monkeypatch, tried, rms=1.0, heading=1.0, median=1.0):
+    """The answer where the errors with ``tried`` are so many times those with the accepted explanation."""
+
+    def errors(_problem, fits):
+        assert list(fits.values()) == [tried, FIT]
+        models = [
+            ModelError(name, 0.01 * r, 0.0, 0.0, 0.01 * m, 0.1 * h)
+            for name, r, m, h in zip(fits, (rms, 1.0), (median, 1.0), (heading, 1.0), strict=True)
+        ]
+        return PairedErrors({"1s": HorizonErrors("1s", WINDOWS, 0, tuple(models), (), None, 0.001)}, None, 60)
+
+    monkeypatch.setattr(negligible, "_errors_of", errors)
+    return negligibly_worse(None, tried, FIT, WITHOUT)
+
+
+@pytest.mark.parametrize(("share", "tie"), [(0.9 * NEARLY, True), (1.1 * NEARLY, False), (-0.5, True)])
+def test_it_must_do_nearly_all_that_the_accepted_one_does(monkeypatch, share, tie):
+    assert worse(monkeypatch, losing(share)) is tie
+
+
+@pytest.mark.parametrize("what", ["rms", "heading", "median"])
+def test_no_error_may_show_what_it_lacks(monkeypatch, what):
+    assert worse(monkeypatch, losing(0.01), **{what: 1 + 0.9 * LEAST_FALL})
+    assert not worse(monkeypatch, losing(0.01), **{what: 1 + 1.1 * LEAST_FALL})
+    assert worse(monkeypatch, losing(0.01), **{what: 0.5})
+
+
+def test_one_with_more_numbers_that_does_less_is_no_rival(monkeypatch):
+    assert not worse(monkeypatch, losing(0.01, free=("b", "c")))
+
+
+NOISE = [1e-4, 1e-4, 3e-4]
+STEP_S, FRAME_STEPS, BASE_M, LOOP_S = 0.001, 40, 0.25, 0.003
+
+
+def followed(told):
+    """Wheel speeds (steps,) of a speed loop with two equal time constants, each step exact for a command that stays."""
+    out, first, second = np.zeros(len(told)), 0.0, 0.0
+    decay = np.exp(-STEP_S / LOOP_S)
+    for i, u in enumerate(told):
+        a, b = first - u, second - u
+        first, second = u + a * decay, u + (b + a * STEP_S / LOOP_S) * decay
+        out[i] = second
+    return out
+
+
+def driven(number, rng):
+    left, right = (np.repeat(rng.uniform(0.1, 0.5, 8), 1000) for _ in range(2))
+    wheels = [np.concatenate([[0.0], followed(told)]) for told in (left, right)]
+    on_left, on_right = ((w[1:] + w[:-1]) / 2 for w in wheels)
+    turn = np.concatenate([[0.0], np.cumsum((on_right - on_left) / BASE_M * STEP_S)])
+    middle = (turn[1:] + turn[:-1]) / 2
+    way = (on_left + on_right) / 2 * STEP_S
+    x, y = (np.concatenate([[0.0], np.cumsum(way * direction(middle))]) for direction in (np.cos, np.sin))
+    at = np.arange(0, len(left) + 1, FRAME_STEPS)
+    poses = np.column_stack([x, y, turn])[at] + rng.normal(size=(len(at), 3)) * NOISE
+    now = np.minimum(at, len(left) - 1)
+    table = {"trial": number, "t_s": at * STEP_S, "left_m_s": left[now], "right_m_s": right[now]}
+    return pd.DataFrame(table | dict(zip(("x_m", "y_m", "heading_rad"), poses.T, strict=True)))
+
+
+@pytest.mark.slow
+def test_a_speed_loop_of_six_milliseconds_is_a_lag_a_delay_or_a_clock():
+    """Its response is neither of them; in 40 ms from picture to picture none can be seen to be it."""
+    rng = np.random.default_rng(4)
+    table = pd.concat([driven(number, rng) for number in range(40)], ignore_index=True)
+    found = diagnose(WheelPredictor(tracks_of(table)), Model(wheelbase_m=BASE_M))
+    assert found.verdict == "tie"
+    assert {names[-1] for names in found.as_json()["explanations"]} == {"clock-offset", "command-delay", "motor-lag"}
