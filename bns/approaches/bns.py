@@ -17,6 +17,7 @@ from bns.approaches.parts.hybrid import MODELS, NO_MODEL, Arcs, HybridSimulator,
 from bns.approaches.parts.informed import SNAPSHOTS, most_informative
 from bns.approaches.parts.neuro_simulation import NeuroSimulation
 from bns.approaches.parts.noisy import NoisySimulator, check_missed, check_noise, most_certain, residual_sd
+from bns.approaches.parts.polishing import check_polish, polished
 from bns.approaches.parts.shortening import shorten
 from bns.approaches.parts.surprise import IN_A_ROW, Surprise
 from bns.bootstrap.simulators import NetworkSimulator, Simulator
@@ -52,6 +53,9 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
 
     ``shorten``: so large a share of all children loses commands (`bns.approaches.parts.shortening`).
 
+    ``polish``: under noise, so many steps of a local search follow each round, from the surest controller on
+    (`bns.approaches.parts.polishing`).
+
     ``ensemble``: so many networks for each displacement (`bns.approaches.parts.ensemble`). ``use``: evolution works on
     their mean, on the one that thinks worst of a controller, or on one of them, drawn for each round.
 
@@ -71,6 +75,7 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
         "renew": Option(0, 0, 1000, "rounds without a controller that reaches all goals until a new population; 0: never"),
         "missed": Option(0.0, 0.0, 1000.0, "m that each goal missed under noise, and failing, costs beyond the robot's penalty"),
         "shorten": Option(0.0, 0.0, 1.0, "fraction of each generation's children that lose commands"),
+        "polish": Option(0, 0, 1000, "steps of a local search on the surest controller after each round, under noise; 0: none"),
         "ensemble": Option(1, 1, 100, "networks for each displacement"),
         "use": Choice("mean", USES, "what evolution works on where networks are several"),
         "informed": Option(0.0, 0.0, 1.0, "fraction of the population, fittest first, of which the most informative is driven"),
@@ -90,7 +95,9 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
         if setting.options["noise"]:
             check_noise(setting)
         check_missed(setting)
+        check_polish(setting)
         self._chosen: tuple[int, np.ndarray] | None = None
+        self._polished: list[np.ndarray] = []
         super().__init__(setting, trainer)
         if setting.options["shorten"]:
             self.evolver.after_breeding = self._shorten
@@ -154,6 +161,8 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
             all_reached = scores.goals_reached[best] == len(self.setting.task.goals_m)
             self._narrowed = min(self._narrowed + 1, STEPS) if all_reached else max(self._narrowed - 1, 0)
             self._in_vain = 0 if all_reached else self._in_vain + 1
+            if self.setting.options["polish"] and (all_reached or self._polished):
+                self._polish()
 
     def simulator_now(self) -> Simulator:
         """The networks, or what ``use`` makes of several."""
@@ -170,10 +179,23 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
         if not isinstance(simulator, NoisySimulator):
             return super().fittest()
         if self._chosen is None or self._chosen[0] != evolver.generations:
-            key, step = self.setting.own_key("noise"), evolver.generations
-            found = most_certain(simulator, evolver.population, evolver.order, self.setting.task, key, step)
-            self._chosen = step, evolver.population.controller(found)
+            self._chosen = evolver.generations, evolver.population.controller(self._surest(simulator))
         return self._chosen[1].copy()
+
+    def _surest(self, simulator: NoisySimulator) -> int:
+        evolver, key = self.evolver, self.setting.own_key("noise")
+        return most_certain(simulator, evolver.population, evolver.order, self.setting.task, key, evolver.generations)
+
+    def _polish(self) -> None:
+        """A local search from the surest controller, of this round or of an earlier one; it takes the place of this round's."""
+        setting, simulator, evolver = self.setting, self.simulator, self.evolver
+        assert isinstance(simulator, NoisySimulator)
+        with self.timed("evolution_cpu_s"):
+            found = self._surest(simulator)
+            known = [evolver.population.controller(found), *self._polished]
+            self._polished = [polished(simulator, known, setting, evolver.generations)]
+            evolver.put(found, self._polished[0], simulator)
+        self._chosen = evolver.generations, self._polished[0]
 
     def _shorten(self, children: Population, generation: int) -> None:
         setting = self.setting
@@ -189,11 +211,12 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
     def _on(self, weights: np.ndarray) -> Simulator:
         """These networks, after the model where there is one, and under noise where that is asked for."""
         networks = NetworkSimulator(self.setting.robot, self.goals(), weights)
+        simulator = HybridSimulator(self._arcs.robot, self.goals(), self._arcs, networks) if self._arcs else networks
         if rows := self.setting.whole("noise"):
             sd = residual_sd(self.setting.robot, weights, self.trainer.data.validation)
             sd_now, missed_m = sd * self._narrowed / STEPS, self.setting.number("missed")
-            return NoisySimulator(networks, sd_now, rows, missed_m=missed_m)
-        return networks if self._arcs is None else HybridSimulator(self._arcs.robot, self.goals(), self._arcs, networks)
+            return NoisySimulator(simulator, sd_now, rows, missed_m=missed_m)
+        return simulator
 
     def goals(self) -> Task:
         """The task with goals as narrow as they now are in evolution."""

@@ -95,6 +95,13 @@ class Evolver:
         self.population.commands[who], self.population.lengths[who] = others.commands[who], others.lengths[who]
         self.population.origin[who] = -1
 
+    def put(self, who: int, controller: np.ndarray, simulator: Simulator) -> None:
+        """A controller (n, components) in the place of one; all are scored again on the simulator, with the draws of before."""
+        self.population.commands[who] = 0
+        self.population.commands[who, : len(controller)], self.population.lengths[who] = controller, len(controller)
+        self.population.origin[who] = -1
+        self._score(simulator)
+
     def _score(self, simulator: Simulator, parents: Scores | None = None) -> None:
         stream = RandomStream(self.key, self.generations)
         self.scores = simulator.score(self.population, stream, parents)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bns.approaches import start_approach
+from bns.approaches.parts.hybrid import Arcs, HybridSimulator
 from bns.approaches.parts.noisy import DRAWS, ELITE, FEWEST, NoisySimulator, most_certain, residual_sd
 from bns.bootstrap.loop import run
 from bns.bootstrap.simulators import NetworkSimulator
@@ -15,6 +16,7 @@ from bns.engine.patterns import PatternSet
 from bns.engine.philox import Key, Purpose, normals
 from bns.engine.snn import predict
 from bns.errors import SpecError
+from bns.physics.model import load_model
 from bns.robots import load_robot
 from bns.robots.base import RandomStream
 from bns.robots.khepera import GOAL_RADIUS_M, MISSED_GOAL_M, START
@@ -82,6 +84,42 @@ def test_all_controllers_have_the_same_noise_and_the_next_generation_another():
     now, later = (simulator.score(twice, RandomStream(KEY, step)).fitness for step in (1, 2))
     assert now[0] == now[1] != later[0] == later[1]
     assert simulator.score(twice).fitness[0] == simulator.networks.score(twice).fitness[0]
+
+
+@pytest.mark.parametrize("sd", [0 * SD, SD / 3], ids=["none", "some"])
+def test_behind_a_model_the_sum_of_model_and_networks_is_walked_under_noise(sd):
+    population, task = some(), replace(CIRCLE, radius_m=0.3)
+    networks = NetworkSimulator(KHEPERA, task, STILL)
+    hybrid = HybridSimulator(KHEPERA, task, Arcs(KHEPERA, load_model("khepera")), networks)
+    found = NoisySimulator(hybrid, sd, ROWS).score(population, STREAM)
+    rows = drawn(ROWS, int(population.lengths.max()), sd)
+    for i, length in enumerate(population.lengths):
+        moved = KHEPERA.measured_displacements(hybrid.poses(population.controller(i)))
+        slow = reference.expected_walk(moved, rows[:, :length], START, task.goals_m, 0.3, MISSED_GOAL_M)
+        np.testing.assert_allclose(1 / found.fitness[i], slow[0], rtol=1e-4)
+    assert len(set(found.goals_reached)) > 1  # else the walk meant little
+    # What children inherit is what the networks said, without the model.
+    np.testing.assert_array_equal(found.outputs, networks.score(population).outputs)
+
+
+def test_behind_a_model_the_noise_is_what_the_networks_have_not_learned_of_its_errors():
+    drives = [KHEPERA.random_controllers(KEY, 10, 13).controller(number) for number in range(5)]
+
+    def started(name):
+        approach = start_approach(KHEPERA, CIRCLE, KEY, RunSpec(**SMALL | {"approach": name, "population_size": 50}))
+        approach._narrowed = 10
+        for number, commands in enumerate(drives, start=1):
+            approach.learn(commands, _driven(commands), number)
+        return approach
+
+    said, plain = started("bns+noise=2+model=khepera"), started("bns+noise=2")
+    # The drawing is what was driven: untrained networks say nothing beside it, and there is no noise but rounding.
+    assert said._on(said.weights).sd.max() < 1e-5 < plain._on(plain.weights).sd.min() / 100
+
+
+def _driven(commands):
+    arcs = Arcs(KHEPERA, load_model("khepera"))
+    return KHEPERA.poses(arcs.displacements(commands), commands)
 
 
 def test_the_noise_is_the_error_on_patterns_that_taught_nothing():
@@ -186,7 +224,9 @@ def test_no_noise_leaves_every_number_as_it_was_and_noise_goes_by_the_seed():
     assert numbers("bns+noise=3") != numbers("bns+noise=3+margin=0.03")
 
 
-@pytest.mark.parametrize("more", ["ensemble=2", "ensemble=2+use=sampled", "informed=0.2", "window=3", "restart=2"])
+@pytest.mark.parametrize(
+    "more", ["ensemble=2", "ensemble=2+use=sampled", "informed=0.2", "window=3", "restart=2", "model=khepera", "polish=3"]
+)
 def test_it_combines_with_the_other_options(more):
     assert len(numbers(f"bns+noise=2+{more}")["best_fitness"]) == SMALL["evaluations"]
 
@@ -195,7 +235,6 @@ def test_it_combines_with_the_other_options(more):
     ("approach", "changes", "said"),
     [
         ("bns+noise=4", {"robot": "snake", "task": "two-regions"}, "robot snake takes no noise from an approach"),
-        ("bns+noise=4+model=khepera", {}, "cannot be combined with model=khepera"),
         ("bns+noise=4+ensemble=3+use=worst", {}, "cannot be combined with use=worst"),
         ("bns+noise=1.5", {}, "noise is '1.5'; it must be a whole number from 0 to 1000"),
     ],

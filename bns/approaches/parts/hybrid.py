@@ -103,13 +103,20 @@ class HybridSimulator:
 
     def score(self, population: Population, stream: RandomStream | None = None, parents: Scores | None = None) -> Scores:
         """The robot's walk along the sum; what is handed on to children is what the networks said."""
-        outputs = self.networks.score(population, stream, parents).outputs
-        there = np.arange(population.commands.shape[1]) < population.lengths[:, None]
-        moved = self.arcs.displacements(population.commands[there])
-        if outputs is None:
+        learned = self.networks.score(population, stream, parents)
+        scores = self.robot.walk(population, self._moved(population, learned), self.task, stream)
+        return scores._replace(outputs=learned.outputs)
+
+    def foretold(self, population: Population, scores: Scores) -> np.ndarray:
+        """What each command of these scores does, in units of targets (networks, commands)."""
+        return self.robot.targets(self._moved(population, scores))
+
+    def _moved(self, population: Population, scores: Scores) -> np.ndarray:
+        """Displacements (commands, networks), SI: the model's, and what the networks said."""
+        if scores.outputs is None:
             raise SpecError(f"robot {self.robot.name} does not say what its networks said; use bns without a model.")
-        scores = self.robot.walk(population, moved + self.robot.displacements(outputs), self.task, stream)
-        return scores._replace(outputs=outputs)
+        there = np.arange(population.commands.shape[1]) < population.lengths[:, None]
+        return self.arcs.displacements(population.commands[there]) + self.robot.displacements(scores.outputs)
 
     def plan(self, controller: np.ndarray, stream: RandomStream | None = None) -> np.ndarray:
         """A controller is driven as it is."""

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from bns.approaches.parts.base import Setting
+from bns.approaches.parts.hybrid import HybridSimulator
 from bns.bootstrap.simulators import NetworkSimulator
 from bns.engine.evolution import Population
 from bns.engine.patterns import PatternSet
@@ -35,10 +36,8 @@ def check_noise(setting: Setting) -> None:
     robot = setting.robot
     if not hasattr(robot, "expected"):
         raise SpecError(f"approach bns+noise: robot {robot.name} takes no noise from an approach; use bns without it.")
-    for option, default in (("model", "none"), ("use", "mean")):
-        chosen = setting.chosen(option)
-        if chosen not in {default, "sampled"}:
-            raise SpecError(f"approach bns+noise: it cannot be combined with {option}={chosen}; leave one of them out.")
+    if (use := setting.chosen("use")) == "worst":
+        raise SpecError(f"approach bns+noise: it cannot be combined with use={use}; leave one of them out.")
 
 
 def check_missed(setting: Setting) -> None:
@@ -58,9 +57,12 @@ def residual_sd(robot: Robot, weights: np.ndarray, patterns: PatternSet) -> np.n
 
 @dataclass(frozen=True)
 class NoisySimulator:
-    """Networks whose errors are known: fitness is that of the mean sum of distances over ``rows`` noisy simulations."""
+    """Networks whose errors are known: fitness is that of the mean sum of distances over ``rows`` noisy simulations.
 
-    networks: NetworkSimulator
+    Behind a physics model, the errors are those of the networks on what the model gets wrong: those of the sum.
+    """
+
+    networks: NetworkSimulator | HybridSimulator
     sd: np.ndarray
     """Standard deviations (networks,) of what one command does, SI."""
     rows: int
@@ -91,7 +93,7 @@ class NoisySimulator:
 
     def _expected(self, population: Population, scores: Scores, task: Task, rows: int, stream: RandomStream) -> Any:
         robot: Any = self.networks.robot
-        return robot.expected(population, scores.outputs, task, self.sd, rows, stream)
+        return robot.expected(population, self.networks.foretold(population, scores), task, self.sd, rows, stream)
 
     def plan(self, controller: np.ndarray, stream: RandomStream | None = None) -> np.ndarray:
         """A controller is driven as it is without noise."""
