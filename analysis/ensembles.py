@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -49,16 +49,19 @@ def _common(rows: pd.DataFrame) -> pd.DataFrame:
     return rows[have == len(CELLS)]
 
 
-def changes(rows: pd.DataFrame, driven: pd.DataFrame) -> pd.DataFrame:
-    """Changes paired by seed, with bootstrap intervals over seeds, of each task and of the mean of all three: in the last
-    evaluations (``last``), and of the final controllers in the world (``world``)."""
-    cells = {cell: limits.of_seeds(own)["last"] for cell, own in rows.groupby(["task", "approach"])}
+def changes(
+    rows: pd.DataFrame, driven: pd.DataFrame, pairs: Mapping[str, tuple[str, str]] = _CHANGES, measures: Sequence[str] = ("last",)
+) -> pd.DataFrame:
+    """Changes paired by seed, with bootstrap intervals over seeds, of each task and of the mean of all three: in the evaluations
+    of each of ``measures`` (``early``, ``last``), and of the final controllers in the world (``world``). ``pairs``: of which
+    approach, and to which, under a name."""
+    cells = {cell: limits.of_seeds(own) for cell, own in rows.groupby(["task", "approach"])}
     shares = pd.concat(cells, names=["task", "approach"])
     world = driven.set_index(["task", "approach", "seed"]).noisy
     table = []
-    for name, values in (("last", shares), ("world", world)):
+    for name, values in (*((measure, shares[measure]) for measure in measures), ("world", world)):
         by_cell = values.unstack("approach").astype(float)
-        for what, (base, new) in _CHANGES.items():
+        for what, (base, new) in pairs.items():
             gained = (by_cell[new] - by_cell[base]).unstack("task")
             for group, tasks in _GROUPS.items():
                 own = gained[list(tasks)].dropna().mean(axis=1)

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis import ceiling, ensembles, limits
+from analysis import ceiling, ensembles, limits, polishing
 from bns.engine.philox import Key, Purpose
 from bns.robots.base import RandomStream
 from bns.tasks import load_task
@@ -123,3 +123,20 @@ def test_what_networks_and_generations_gain_is_paired_by_seed_and_the_mean_of_th
         assert table.loc[(measure, "60 generations, with three networks", "infinity"), "change"] == pytest.approx(60)
     assert said[2] == "| both | 0 (0 to 0) | +80 (+80 to +80) | +80 (+80 to +80) | +53 (+53 to +53) |"
     assert len(said) == 5
+
+
+def test_what_polishing_gains_is_told_of_the_first_evaluations_too():
+    rows, driven = [], []
+    for task in ceiling.TASKS:
+        for name, early, last in zip(polishing.NAMES.values(), (1, 2), (0, 3), strict=True):
+            for seed in range(6):
+                driven.append({"task": task, "approach": name, "seed": seed, "noisy": last / 5})
+                for evaluation in range(1, 41):
+                    success = int(evaluation <= 4 * early or evaluation > 40 - last)
+                    rows.append({"task": task, "approach": name, "seed": seed, "evaluation": evaluation, "success": success})
+    said = polishing.changes_in_words(polishing.changes(pd.DataFrame(rows), pd.DataFrame(driven)))
+    assert said == [
+        "| evaluations 1 to 20 |" + 4 * " +20 (+20 to +20) |",
+        "| evaluations 56 to 60 |" + 4 * " +60 (+60 to +60) |",
+        "| final controllers in the world |" + 4 * " +60 (+60 to +60) |",
+    ]
