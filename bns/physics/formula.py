@@ -48,7 +48,7 @@ VARIABLES: Mapping[str, str] = {
     "x": "position east, m",
     "y": "position north, m",
     "heading": "heading, rad",
-    "moving": "1 while a wheel turns, else 0",
+    "moving": "1 while a wheel turns, else 0; with wheels that lag it comes and goes as late",
     "swing": "how far the present direction of motion differs from that over the last half wheelbase of distance: 0 the same, "
     "1 the opposite",
 }
