@@ -190,9 +190,23 @@ def test_a_number_that_no_robot_has_competes_by_the_best_plausible_one(monkeypat
     monkeypatch.setattr(stepwise, "fit_without", lambda *_: None)
     monkeypatch.setattr(stepwise, "believable", lambda *_: "model")
     monkeypatch.setattr(stepwise, "indistinguishable", lambda one, *_: one.name == alike)
+    monkeypatch.setattr(stepwise, "negligibly_worse", lambda *_: False)
     problem = SimpleNamespace(fit=lambda model: SimpleNamespace(name={"model": "held"}[model]))
     found = search._competing_models(problem, fit, ("a", "b"))
     assert found == ([(("a", "c"), tried)] if competes else [])
+
+
+@pytest.mark.parametrize(("nearly", "competes"), [("held", True), ("as found", False), ("nobody", False)])
+def test_one_that_does_nearly_all_competes_too_with_its_plausible_number(monkeypatch, nearly, competes):
+    search = StepwiseSelection.__new__(StepwiseSelection)
+    fit, tried = SimpleNamespace(free=[1]), SimpleNamespace(free=[1], name="as found")
+    search._exchanges = SimpleNamespace(of=lambda *_: [("b", "c", tried)])
+    search._acceptance = SimpleNamespace(rejected=lambda *_, **__: "", earned_over=lambda *_: True)
+    for name, answer in (("fit_without", None), ("believable", "model"), ("indistinguishable", False)):
+        monkeypatch.setattr(stepwise, name, lambda *_, answer=answer: answer)
+    monkeypatch.setattr(stepwise, "negligibly_worse", lambda _, one, *__: one.name == nearly)
+    problem = SimpleNamespace(fit=lambda model: SimpleNamespace(name={"model": "held"}[model]))
+    assert search._competing_models(problem, fit, ("a", "b")) == ([(("a", "c"), tried)] if competes else [])
 
 
 def test_the_best_of_the_decoys_sets_the_threshold(monkeypatch):

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.diagnosis import diagnose
+from bns.diagnose.diagnosing import diagnose
 from bns.diagnose.predict.paired_errors import HorizonErrors, ModelError, PairedErrors
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.select import negligible
