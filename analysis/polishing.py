@@ -1,4 +1,4 @@
-"""What a local search on the surest controller gains: the sweep ``noise-polish``, beside a row of ``noise-late``.
+"""What a local search on the surest controller gains: the sweep ``noise-polish``.
 
 `python -m analysis.polishing [--runs ARCHIVE] [--drives CSV]`: by default from what is published.
 """
@@ -16,27 +16,25 @@ from analysis.results import Results
 
 SWEEP = "noise-polish"
 NAMES = {ensembles.ALONE: "(without)", f"{ensembles.ALONE}+polish=10": "`polish=10`"}
-"""How the page calls the approaches; the first one's runs are those of the sweep `limits.LATE`."""
+"""How the page calls the approaches."""
 MEASURES = {"early": "evaluations 1 to 20", "last": "evaluations 56 to 60", "world": "final controllers in the world"}
 _WITHOUT, _POLISHED = NAMES.values()
 
 
 def evaluations(runs: Path) -> pd.DataFrame:
     """A row an evaluation, as `limits.evaluations`, of the seeds of a task that both have."""
-    before = limits.evaluations(Results(limits.PUBLISHED / f"{limits.LATE}.parquet", archived=True), limits.LATE)
-    return _named(before, limits.evaluations(Results(runs, archived=True), SWEEP))
+    return _named(limits.evaluations(Results(runs, archived=True), SWEEP))
 
 
 def drives(path: Path) -> pd.DataFrame:
     """Rows of `analysis.margins` of the final controllers, of the seeds of a task that both have."""
-    return _named(pd.read_csv(limits.PUBLISHED / f"{limits.LATE}-drives.csv"), pd.read_csv(path))
+    rows = pd.read_csv(path)
+    have = rows.groupby(["task", "seed"]).approach.transform("nunique")
+    return _named(rows[have == len(NAMES)])
 
 
-def _named(before: pd.DataFrame, rows: pd.DataFrame) -> pd.DataFrame:
-    together = pd.concat([before[before.approach == ensembles.ALONE], rows], ignore_index=True)
-    together = together.assign(approach=together.approach.map(NAMES))
-    have = together.groupby(["task", "seed"]).approach.transform("nunique")
-    return together[have == len(NAMES)]
+def _named(rows: pd.DataFrame) -> pd.DataFrame:
+    return rows.assign(approach=rows.approach.map(NAMES))
 
 
 def changes(rows: pd.DataFrame, driven: pd.DataFrame) -> pd.DataFrame:

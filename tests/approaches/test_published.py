@@ -5,7 +5,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from analysis import approach_pairs, approach_summary, ceiling, ensembles, limits
+from analysis import approach_pairs, approach_summary, ceiling, ensembles, limits, polishing
 from analysis.results import Results
 
 ROOT = Path(__file__).parents[2]
@@ -77,6 +77,15 @@ def test_what_is_said_of_networks_and_generations_is_what_the_archives_give():
     table = ensembles.changes(rows, driven)
     for measure in ("last", "world"):
         assert "\n".join(ensembles.changes_in_words(table, measure)) in TEXT
+
+
+def test_what_is_said_of_polishing_is_what_the_archives_give():
+    rows = polishing.evaluations(limits.PUBLISHED / "noise-polish.parquet")
+    driven = polishing.drives(limits.PUBLISHED / "noise-polish-drives.csv")
+    said = limits.late_in_words(rows, driven, "{}")
+    assert len(said) == 6
+    assert "\n".join(said) in TEXT
+    assert "\n".join(polishing.changes_in_words(polishing.changes(rows, driven))) in TEXT
 
 
 def test_what_is_said_of_noise_is_what_its_archive_and_its_drives_give():
