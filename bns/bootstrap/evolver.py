@@ -97,7 +97,6 @@ class Evolver:
 
     def put(self, who: int, controller: np.ndarray, simulator: Simulator) -> None:
         """A controller (n, components) in the place of one; all are scored again on the simulator, with the draws of before."""
-        self.population.commands[who] = 0
         self.population.commands[who, : len(controller)], self.population.lengths[who] = controller, len(controller)
         self.population.origin[who] = -1
         self._score(simulator)

@@ -84,6 +84,14 @@ def test_the_environment_names_another_folder(table, asked, tmp_path, monkeypatc
     assert not entries(tmp_path)
 
 
+def test_another_model_beside_it_is_another_question(table, asked, tmp_path):
+    beside = [bns.Model(NOMINAL).with_effect("motor-lag", tau_s=tau_s) for tau_s in (0.1, 0.2)]
+    found = [bns.compare(table, NOMINAL, beside=one).changes.position_m.dropna().to_list() for one in (*beside, beside[0], ())]
+    assert found[0] == found[2] != found[1]
+    assert found[3] == []
+    assert len(entries(tmp_path)) == 3
+
+
 @pytest.mark.slow
 def test_whatever_changes_is_asked_again(table, asked, monkeypatch):
     def ask(log=table, model=NOMINAL, **more):

@@ -8,7 +8,7 @@ import pytest
 from bns.approaches.bns import BootstrappedNeuroSimulation
 from bns.approaches.parts.base import Setting
 from bns.approaches.parts.noisy import NoisySimulator
-from bns.approaches.parts.polishing import polished
+from bns.approaches.parts.polishing import _changed, polished
 from bns.bootstrap.loop import run
 from bns.bootstrap.simulators import NetworkSimulator
 from bns.engine.evolution import Population
@@ -74,12 +74,21 @@ def test_in_the_draws_of_its_round_it_is_never_worse(lists):
         assert success(polished(SIMULATOR, lists, own, number), stream) >= max(success(one, stream) for one in lists)
 
 
-def test_no_list_becomes_shorter_than_the_shortest_allowed(lists):
-    long = [np.repeat(START, 4, axis=0)]  # far from all goals: nothing that is tried is better or worse
-    assert len(polished(SIMULATOR, long, setting(), 1)) == 12
-    shortest = len(lists[-1])
-    found = polished(SIMULATOR, lists[-1:], setting("bns+noise=4+polish=60", min_commands=shortest, max_commands=shortest), 1)
-    assert len(found) == shortest
+def test_where_nothing_helps_the_list_stays():
+    far = [np.repeat(START, 4, axis=0)]
+    np.testing.assert_array_equal(polished(SIMULATOR, far, setting(), 1), far[0])
+
+
+@pytest.mark.parametrize(("shortest", "lengths"), [(3, {3}), (2, {2, 3})])
+def test_lists_that_are_tried_are_no_shorter_than_the_shortest_allowed_and_within_bounds(shortest, lengths):
+    own, random = setting(min_commands=shortest), np.random.default_rng(1)
+    bounds = KHEPERA.bounds
+    at_the_ends = np.array([bounds.low, bounds.high, bounds.low], np.float32)
+    tried = [_changed(at_the_ends, 0.1, own, random) for _ in range(200)]
+    assert {len(one) for one in tried} == lengths
+    assert all((one >= bounds.low).all() and (one <= bounds.high).all() for one in tried)
+    of_all = [one for one in tried if len(one) == 3 and (one != at_the_ends).sum() > 3]  # half of them lie at a bound
+    assert 40 < len(of_all) < 140
 
 
 def test_each_round_draws_anew_and_the_same_round_the_same(lists):
@@ -110,6 +119,14 @@ def test_what_was_polished_is_the_fittest_drives_on_and_is_scored():
     np.testing.assert_array_equal(evolver.scores.fitness, approach.simulator.score(evolver.population, stream).fitness)
     assert (np.diff(evolver.scores.fitness[evolver.order]) <= 0).all()
     assert (evolver.population.origin[place[0]] == -1).all()
+
+
+def test_what_was_polished_is_the_fittest_though_others_succeed_more_often(monkeypatch):
+    poor = np.repeat(START, 2, axis=0)
+    monkeypatch.setattr("bns.approaches.bns.polished", lambda *_: poor)
+    approach = BootstrappedNeuroSimulation.start(setting())
+    advanced(approach, 1)
+    np.testing.assert_array_equal(approach.fittest(), poor)
 
 
 def test_what_was_polished_before_is_polished_further(monkeypatch):

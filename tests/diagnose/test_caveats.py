@@ -292,6 +292,21 @@ def test_so_many_more_trials_as_would_make_a_sign_certain_are_asked_for(z, more)
     assert note == f"turn-slip may be missing, but 10 trials are too few to decide; about {more} more would decide."
 
 
+@pytest.mark.parametrize(("terms", "all_explained"), [((), True), (("a term",), False)])
+def test_notes_on_effects_know_whether_something_is_left(monkeypatch, terms, all_explained):
+    told = []
+    monkeypatch.setattr("bns.diagnose.caveats.on_effects", lambda *given: [told.append(given[3])])
+    nothing = dict.fromkeys(("imitating", "withdrawn", "unseen", "negligible", "formula", "errors_with_terms"))
+    nothing["beside_negligible"] = nothing["kept_for"] = nothing["seen_in_heading"] = {}
+    selection = SimpleNamespace(implausible={}, accepted=())
+    found = SimpleNamespace(**nothing | {"selection": selection, "rest": NOTHING, "terms": terms, "negligible": {}})
+    monkeypatch.setattr("bns.diagnose.caveats.on_moved", lambda _: [])
+    notes = notes_on(found, None, None)
+    while not told:
+        next(notes)
+    assert told == [all_explained]
+
+
 def test_a_number_without_a_unit_is_written_without_one(monkeypatch):
     monkeypatch.setattr("bns.diagnose.caveats.known_effects", lambda _selection: {})
     monkeypatch.setattr("bns.diagnose.caveats.on_moved", lambda _: ["What it moves."])
