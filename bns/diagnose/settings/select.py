@@ -201,7 +201,7 @@ class Select:
 
 @dataclass(frozen=True)
 class Verdict:
-    """``diagnosis.py``, ``caveats.py``, ``comparison.py``: what is reported in addition to an effect, or instead of one."""
+    """``diagnosing.py``, ``caveats.py``, ``comparison.py``: what is reported in addition to an effect, or instead of one."""
 
     few_trials: int = setting(
         40,
