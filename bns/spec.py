@@ -25,12 +25,13 @@ ENGINE_VERSION = 3
 APPROACH_VERSIONS: Mapping[str, int] = {
     "anytime": 2,
     "back-to-reality": 2,
-    "estimation-exploration": 2,
+    "estimation-exploration": 3,
     "transferability": 2,
 }
 """Raised where a spec would give other numbers with one approach alone; part of its runs' names. The others have 1, unsaid.
 
-2: physics models are integrated in graded steps (`bns.bootstrap.simulators.GROWTH`).
+2: physics models are integrated in graded steps (`bns.bootstrap.simulators.GROWTH`). 3: in a model, a turn rate that is added
+while the robot moves comes and goes as late as wheels that lag.
 """
 
 MOST_COMMANDS = 20_000_000
