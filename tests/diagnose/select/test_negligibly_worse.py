@@ -8,7 +8,7 @@ import pytest
 
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosing import diagnose
-from bns.diagnose.predict.paired_errors import HorizonErrors, ModelError, PairedErrors
+from bns.diagnose.predict.horizons import Errors
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.select import negligible
 from bns.diagnose.select.negligible import LEAST_FALL, NEARLY, negligibly_worse
@@ -16,27 +16,32 @@ from bns.physics.model import Model
 
 FIT = SimpleNamespace(held_out=np.arange(60.0), free=("a",))
 WITHOUT = SimpleNamespace(held_out=FIT.held_out + 100.0, free=())
-WINDOWS = 10**8
-"""So many that no luck is left."""
+WINDOWS = 90_000
+"""So many that a tenth of a per cent of luck is left."""
 
 
 def losing(share, free=("b",)):
     return SimpleNamespace(held_out=FIT.held_out + 100.0 * share, free=free)
 
 
-def worse(monkeypatch, tried, rms=1.0, heading=1.0, median=1.0):
+def windows(rms=1.0, heading=1.0, median=1.0, bad=0.0):
+    """Errors of which a tenth is large; so many times their root mean square (by the large), heading and median (by the small
+    ones). ``bad``: that of as many windows more, of another trial."""
+    large_m = 0.05 * np.sqrt((rms**2 * 34 - 9) / 25)
+    position = np.where(np.arange(WINDOWS) % 10 == 0, large_m, 0.01 * median)
+    position, turn = (np.concatenate([own, np.full(WINDOWS, bad)]) for own in (position, np.full(WINDOWS, 0.1 * heading)))
+    trial = np.repeat([0, 1], WINDOWS)
+    return Errors(trial, trial, trial, position, 0 * position, turn)
+
+
+def worse(monkeypatch, tried, counted=(1.0, 0.0), bad=0.0, **errors):
     """The answer where the errors with ``tried`` are so many times those with the accepted explanation."""
-
-    def errors(_problem, fits):
-        assert list(fits.values()) == [tried, FIT]
-        models = [
-            ModelError(name, 0.01 * r, 0.0, 0.0, 0.01 * m, 0.1 * h)
-            for name, r, m, h in zip(fits, (rms, 1.0), (median, 1.0), (heading, 1.0), strict=True)
-        ]
-        return PairedErrors({"1s": HorizonErrors("1s", WINDOWS, 0, tuple(models), (), None, 0.001)}, None, 60)
-
-    monkeypatch.setattr(negligible, "_errors_of", errors)
-    return negligibly_worse(None, tried, FIT, WITHOUT)
+    tracks = SimpleNamespace(trial=np.array([0, 1]))
+    predictor = SimpleNamespace(tracks=tracks, horizons=("1s",), counted=None if counted is None else np.array(counted))
+    tried.model, FIT.model = windows(**errors, bad=bad), windows(bad=bad)
+    monkeypatch.setattr(negligible, "held_out_steps", lambda _predictor, _filter, model: model)
+    monkeypatch.setattr(negligible, "judged_windows", lambda _predictor, steps, _horizon: steps)
+    return negligibly_worse(SimpleNamespace(predictor=predictor, pose_filter=None), tried, FIT, WITHOUT)
 
 
 @pytest.mark.parametrize(("share", "tie"), [(0.9 * NEARLY, True), (1.1 * NEARLY, False), (-0.5, True)])
@@ -48,7 +53,13 @@ def test_it_must_do_nearly_all_that_the_accepted_one_does(monkeypatch, share, ti
 def test_no_error_may_show_what_it_lacks(monkeypatch, what):
     assert worse(monkeypatch, losing(0.01), **{what: 1 + 0.9 * LEAST_FALL})
     assert not worse(monkeypatch, losing(0.01), **{what: 1 + 1.1 * LEAST_FALL})
-    assert worse(monkeypatch, losing(0.01), **{what: 0.5})
+    assert worse(monkeypatch, losing(0.01), **{what: 0.9})
+
+
+def test_a_trial_that_counts_nothing_hides_nothing(monkeypatch):
+    assert not worse(monkeypatch, losing(0.01), bad=9.0, rms=1.5, heading=1.5, median=1.5)
+    assert worse(monkeypatch, losing(0.01), bad=9.0, counted=None, rms=1.5, heading=1.5)  # it does where it counts
+    assert worse(monkeypatch, losing(0.01), bad=9.0)
 
 
 def test_one_with_more_numbers_that_does_less_is_no_rival(monkeypatch):
