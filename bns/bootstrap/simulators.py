@@ -58,7 +58,7 @@ class NetworkSimulator:
         """By the robot's own compiled kernels."""
         return self.robot.score(population, self.weights, self.task, stream, parents)
 
-    def foretold(self, population: Population, scores: Scores) -> np.ndarray | None:
+    def predicted_outputs(self, population: Population, scores: Scores) -> np.ndarray | None:
         """What each command of these scores does, in units of targets (networks, commands); None if the robot does not tell."""
         return scores.outputs
 

@@ -107,7 +107,7 @@ class HybridSimulator:
         scores = self.robot.walk(population, self._moved(population, learned), self.task, stream)
         return scores._replace(outputs=learned.outputs)
 
-    def foretold(self, population: Population, scores: Scores) -> np.ndarray:
+    def predicted_outputs(self, population: Population, scores: Scores) -> np.ndarray:
         """What each command of these scores does, in units of targets (networks, commands)."""
         return self.robot.targets(self._moved(population, scores))
 

@@ -93,7 +93,7 @@ class NoisySimulator:
 
     def _expected(self, population: Population, scores: Scores, task: Task, rows: int, stream: RandomStream) -> Any:
         robot: Any = self.networks.robot
-        return robot.expected(population, self.networks.foretold(population, scores), task, self.sd, rows, stream)
+        return robot.expected(population, self.networks.predicted_outputs(population, scores), task, self.sd, rows, stream)
 
     def plan(self, controller: np.ndarray, stream: RandomStream | None = None) -> np.ndarray:
         """A controller is driven as it is without noise."""
