@@ -262,7 +262,8 @@ class _Windows:
         squares = np.bincount(self.of_trial, position_m**2, minlength=trials).astype(np.float64)
         drawn = self.draws.rms(squares)
         low, high = self.draws.interval(drawn)
-        summary = ModelError("", _rms(position_m), low, high, _median(position_m), _rms(e.heading_rad[self.kept]))
+        heading_rad = rms_of_all(e.heading_rad[self.kept])
+        summary = ModelError("", rms_of_all(position_m), low, high, median_of_all(position_m), heading_rad)
         return _Judged(position_m, squares, drawn, summary)
 
     def errors(self, models: Sequence[tuple[str, _Judged]]) -> HorizonErrors:
@@ -333,11 +334,13 @@ class _Draws:
         return float(low), float(high)
 
 
-def _rms(values: Array) -> float:
+def rms_of_all(values: Array) -> float:
+    """Root mean square; NaN of nothing."""
     return float(np.sqrt((values * values).mean())) if len(values) else float("nan")
 
 
-def _median(values: Array) -> float:
+def median_of_all(values: Array) -> float:
+    """Median; NaN of nothing."""
     return float(np.median(values)) if len(values) else float("nan")
 
 

@@ -13,14 +13,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bns.diagnose.data.tracks import Array
 from bns.diagnose.estimate.cross_validation import held_out_steps
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.lacking import fit_without
 from bns.diagnose.estimate.parameters import FreeParameter
 from bns.diagnose.estimate.significance import paired_elpd_diff
-from bns.diagnose.predict.paired_errors import HorizonErrors, PairedErrors, judged_windows, paired_errors
+from bns.diagnose.predict.paired_errors import (
+    HorizonErrors,
+    PairedErrors,
+    judged_windows,
+    median_of_all,
+    paired_errors,
+    rms_of_all,
+)
 from bns.diagnose.select.result import SelectionResult
 from bns.diagnose.settings import DEFAULTS
 
@@ -142,17 +148,9 @@ def _most_that_falls(problem: Problem, tried: Fit, fit: Fit) -> float:
             counting = np.unique(predictor.tracks.trial[predictor.counted > 0])
             errors = [one.only(np.isin(one.trial, counting)) for one in errors]
         windows = len(errors[0].start)
-        measures = [(_rms(one.position_m), _rms(one.heading_rad), _median(one.position_m)) for one in errors] if windows else []
+        measures = [(rms_of_all(e.position_m), rms_of_all(e.heading_rad), median_of_all(e.position_m)) for e in errors]
         falls += [_falls_by(before, after, windows) for before, after in zip(*measures, strict=True) if before > 0]
     return max(falls)
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt((values * values).mean()))
-
-
-def _median(values: Array) -> float:
-    return float(np.median(values))
 
 
 def shifted(having: Fit, lacking: Fit, effects: Collection[str]) -> tuple[FreeParameter, ...]:
