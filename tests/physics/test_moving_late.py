@@ -28,6 +28,9 @@ def moving(name, **values):
         ("motor-lag", {"tau_s": 0.08}),
         ("inertia-lag", {"tau_s": 0.05, "turn_ratio": 0.4}),
         ("lag-mismatch", {"tau_s": 0.05, "ratio": 2.0}),
+        ("braking-lag", {"tau_s": 0.05, "brake_ratio": 1.0}),
+        ("controller-overshoot", {"tau_s": 0.05, "lead_s": 0.0, "swing_s": 0.025, "turn_ratio": 1.0}),
+        ("gear-friction", {"tau_s": 0.013, "turn_ratio": 1.0, "friction_m_s": 0.001, "loss_m_s": 0.0}),
     ],
 )
 def test_the_robot_moves_no_longer_than_it_is_told_to(name, values):
@@ -38,6 +41,38 @@ def test_the_robot_moves_no_longer_than_it_is_told_to(name, values):
     assert found[0, 9] == 0
     assert found[0, 10] == pytest.approx(1 - late_s / 0.04, abs=0.05) or late_s > 0.04
     assert found.max() <= 1.0 + 1e-12
+
+
+def test_wheels_that_slow_down_sooner_end_the_motion_sooner():
+    """Of a stop the robot keeps ``brake_s`` of its motion where a start loses ``tau_s``."""
+    found = moving("braking-lag", tau_s=0.06, brake_ratio=0.5)
+    assert (found * STEPS).sum() == pytest.approx(MOVES_S - 2 * (0.06 - 0.03), abs=0.002)
+
+
+def test_a_wheel_that_friction_stops_moves_no_longer():
+    """From 0.2 m/s it stands after tau·ln(1 + w/f)."""
+    stops_s = 0.06 * np.log(1 + 0.2 / 0.1)
+    found = moving("gear-friction", tau_s=0.06, turn_ratio=1.0, friction_m_s=0.1, loss_m_s=0.0)[0, 40:]
+    assert 0.04 < stops_s < 0.08
+    assert found[1] > 0
+    assert not found[2:].any()
+
+
+def test_a_speed_beyond_its_command_moves_the_robot_no_more_than_the_command_does():
+    found = moving("controller-overshoot", tau_s=0.01, lead_s=0.0, swing_s=0.05, turn_ratio=1.0)
+    assert (found.min(), found.max()) == (0.0, 1.0)
+    late = effect_named("controller-overshoot").apply(
+        Wheels(STEPS, TOLD, TOLD, 0.2), tau_s=0.01, lead_s=0.0, swing_s=0.05, turn_ratio=1.0
+    )
+    assert late.left_m_s.max() > 0.35  # it does overshoot
+    assert late.left_m_s.min() < -0.05
+
+
+def test_a_command_that_waits_for_a_tick_moves_the_robot_from_then_on():
+    """Ticks of 150 ms: 0.4 s waits for 0.45 s, 0.8 s for 0.9 s."""
+    found = moving("command-rate", period_s=0.15)
+    np.testing.assert_allclose(found[0, 10:13], [0.0, 0.75, 1.0], atol=1e-12)
+    np.testing.assert_allclose(found[0, 20:24], [1.0, 1.0, 0.5, 0.0], atol=1e-12)
 
 
 def test_a_delay_after_a_lag_shifts_what_the_lag_gave():
@@ -77,18 +112,29 @@ def delayed(told):
     return np.concatenate([np.zeros(late), told[:-late]])
 
 
-def lagging(told, tau_s=0.08):
+def lagging(told, rise_s=0.08, fall_s=0.08):
     """Of a command that stays in each step: means over the step."""
-    out, w, kept = np.empty(len(told)), 0.0, np.exp(-STEP_S / tau_s)
+    out, w = np.empty(len(told)), 0.0
     for i, u in enumerate(told):
+        tau_s = rise_s if u > w else fall_s
+        kept = np.exp(-STEP_S / tau_s)
         out[i] = u + (w - u) * (1 - kept) * tau_s / STEP_S
         w = u + (w - u) * kept
     return out
 
 
+def braking(told):
+    return lagging(told, fall_s=0.03)
+
+
 @pytest.mark.parametrize(
     ("followed", "late", "number"),
-    [(delayed, "command-delay", LATE_S), (delayed, "clock-offset", LATE_S), (lagging, "motor-lag", 0.08)],
+    [
+        (delayed, "command-delay", LATE_S),
+        (delayed, "clock-offset", LATE_S),
+        (lagging, "motor-lag", 0.08),
+        (braking, "braking-lag", 0.08),
+    ],
 )
 def test_a_bias_beside_late_wheels_has_its_number(followed, late, number):
     rng = np.random.default_rng(5)

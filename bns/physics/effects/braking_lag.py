@@ -6,21 +6,18 @@ equation has one time constant while the speed's magnitude rises, another while 
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from bns.physics.effect import Effect, Parameter
-from bns.physics.signals import Wheels
+from bns.physics.signals import Array, Wheels
 from bns.physics.wheels.braking import lagging
 
 
 def apply(wheels: Wheels, tau_s: float, brake_ratio: float) -> Wheels:
     """First-order lag of each wheel from rest, of ``brake_ratio`` times ``tau_s`` while it becomes slower."""
-    brake_s = tau_s * brake_ratio
-    return replace(
-        wheels,
-        left_m_s=lagging(wheels.left_m_s, wheels.step_s, tau_s, brake_s),
-        right_m_s=lagging(wheels.right_m_s, wheels.step_s, tau_s, brake_s),
-    )
+
+    def late(values: Array) -> Array:
+        return lagging(values, wheels.step_s, tau_s, tau_s * brake_ratio)
+
+    return wheels.following(late(wheels.left_m_s), late(wheels.right_m_s), late)
 
 
 EFFECT = Effect(

@@ -7,7 +7,7 @@ command is late by a different fraction of the period: a `command-delay` of half
 from __future__ import annotations
 
 from bns.physics.effect import Effect, Parameter
-from bns.physics.signals import Wheels
+from bns.physics.signals import Array, Wheels
 from bns.physics.wheels.scans import sampled
 
 
@@ -15,9 +15,11 @@ def apply(wheels: Wheels, period_s: float) -> Wheels:
     """Each wheel keeps the speed commanded at the last multiple of ``period_s``."""
     if period_s == 0.0:
         return wheels
-    return wheels.turning(
-        sampled(wheels.left_m_s, wheels.step_s, period_s), sampled(wheels.right_m_s, wheels.step_s, period_s)
-    )
+
+    def late(values: Array) -> Array:
+        return sampled(values, wheels.step_s, period_s)
+
+    return wheels.following(late(wheels.left_m_s), late(wheels.right_m_s), late)
 
 
 EFFECT = Effect(

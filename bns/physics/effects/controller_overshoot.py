@@ -13,18 +13,25 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+import numpy as np
+
 from bns.physics.effect import Effect, Parameter
-from bns.physics.signals import Wheels
+from bns.physics.signals import Array, Wheels
 from bns.physics.wheels.scans import second_order
 
 
 def apply(wheels: Wheels, tau_s: float, lead_s: float, swing_s: float, turn_ratio: float) -> Wheels:
     """The answer of the second order of the wheels' mean and of half their difference, from rest."""
-    mean = (wheels.left_m_s + wheels.right_m_s) / 2
-    half = (wheels.right_m_s - wheels.left_m_s) / 2
-    mean = second_order(mean, wheels.step_s, tau_s, lead_s, swing_s)
-    half = second_order(half, wheels.step_s, tau_s, lead_s, swing_s * math.sqrt(turn_ratio))
-    return wheels.turning(mean - half, mean + half)
+
+    def answer(values: Array, swinging_s: float = swing_s) -> Array:
+        return second_order(values, wheels.step_s, tau_s, lead_s, swinging_s)
+
+    def late(values: Array) -> Array:
+        return np.clip(answer(values), 0.0, 1.0)  # a robot that overshoots moves no more than one that moves
+
+    mean = answer((wheels.left_m_s + wheels.right_m_s) / 2)
+    half = answer((wheels.right_m_s - wheels.left_m_s) / 2, swing_s * math.sqrt(turn_ratio))
+    return wheels.following(mean - half, mean + half, late)
 
 
 def sized_by(values: Mapping[str, float]) -> str:

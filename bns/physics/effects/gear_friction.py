@@ -11,14 +11,20 @@ missing at a steady command. J is that of both wheels of one body, as in `inerti
 from __future__ import annotations
 
 from bns.physics.effect import Effect, Parameter
-from bns.physics.signals import Wheels
+from bns.physics.signals import Array, Wheels
 from bns.physics.wheels.friction import braked_together
+from bns.physics.wheels.scans import first_order
 
 
 def apply(wheels: Wheels, tau_s: float, turn_ratio: float, friction_m_s: float, loss_m_s: float) -> Wheels:
     """The wheels' lag with dry friction, from rest."""
+
+    def late(values: Array) -> Array:
+        return first_order(values, wheels.step_s, tau_s)  # where friction has stopped the wheels, these say so
+
     values = tau_s, turn_ratio, friction_m_s, loss_m_s
-    return wheels.turning(*braked_together(wheels.left_m_s, wheels.right_m_s, wheels.step_s, *values))
+    left_m_s, right_m_s = braked_together(wheels.left_m_s, wheels.right_m_s, wheels.step_s, *values)
+    return wheels.following(left_m_s, right_m_s, late)
 
 
 EFFECT = Effect(
