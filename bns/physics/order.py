@@ -42,6 +42,7 @@ ORDER = (
     "lag-mismatch",
     "braking-lag",
     "gear-friction",
+    "scrub-friction",
     "controller-overshoot",
     "sliding-contact",
     "heating",  # by the work that the wheels really do

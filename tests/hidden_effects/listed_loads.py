@@ -143,6 +143,37 @@ def _braked(volts, inverse, constant, resistance, most, small_s):
 
 
 @dataclass
+class ScrubFriction(Cause):
+    """Motors that push in proportion to what a motion lacks; the floor takes what it can from the turn in each small step."""
+
+    tau_s: float
+    turn_ratio: float
+    friction_rad_s: float
+
+    def body(self, body: Body, moment: Moment) -> Body:
+        small_s = moment.step_s / FINE
+        turn = _pushed(body.turn, small_s / self.tau_s / self.turn_ratio, self.friction_rad_s)
+        return body._replace(forward=_pushed(body.forward, small_s / self.tau_s, 0.0), turn=turn)
+
+
+@njit
+def _pushed(told, share, friction):
+    """Mean in each step of a speed that goes a share of the way in each small one, less friction, which only brakes."""
+    out = np.empty_like(told)
+    for trial in range(told.shape[0]):
+        now = 0.0
+        for i in range(told.shape[1]):
+            way = 0.0
+            for _ in range(FINE):
+                free = now + share * (told[trial, i] - now)
+                after = np.sign(free) * max(abs(free) - share * friction, 0.0)
+                way += (now + after) / 2
+                now = after
+            out[trial, i] = way / FINE
+    return out
+
+
+@dataclass
 class SlidingContact(Cause):
     """Stiff controllers force each wheel of a body with mass and inertia; one of its points rubs on the floor, within a disc."""
 

@@ -84,6 +84,10 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
         {"tau_s": 0.1, "turn_ratio": 1.0, "friction_m_s": 0.03, "loss_m_s": 0.0},
         {"tau_s": 0.2, "turn_ratio": 0.5, "friction_m_s": 0.08, "loss_m_s": 0.01},
     ),
+    "scrub-friction": (
+        {"tau_s": 0.08, "turn_ratio": 0.9, "friction_rad_s": 0.2},
+        {"tau_s": 0.2, "turn_ratio": 0.6, "friction_rad_s": 0.5},
+    ),
     "sliding-contact": (
         {"friction_m_s": 0.006, "distance_share": 0.5, "left_share": 0.0},
         {"friction_m_s": 0.02, "distance_share": 0.9, "left_share": -0.4},
@@ -129,6 +133,7 @@ TURNING = {
     "overload-trip",
     "reversal-pause",
     "reverse-gain",
+    "scrub-friction",
     "sliding-contact",
     "stribeck",
     "supply-trip",

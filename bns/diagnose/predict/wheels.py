@@ -35,7 +35,10 @@ _KEPT = 500_000
 _UNDONE = DEFAULTS.predict.picture_rounds
 _MOVING = ("wheel", "body")
 _DELAY = "command-delay"
-_STATEFUL = ("motor-lag", "inertia-lag", "lag-mismatch", "braking-lag", "gear-friction", "controller-overshoot", "backlash")
+_STATEFUL = (
+    *("motor-lag", "inertia-lag", "lag-mismatch", "braking-lag", "gear-friction", "scrub-friction"),
+    *("controller-overshoot", "backlash"),
+)
 """Effects behind a delay of commands to which it makes no difference whether the delay is before or behind them."""
 
 Chain = tuple[tuple[Effect, tuple[float, ...], tuple[float, ...]], ...]

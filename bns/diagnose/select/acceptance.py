@@ -42,6 +42,11 @@ class Acceptance:
         least = MIN_GAIN * float(before.held_out.mean())
         return e.p_value < self._level and e.z > self._least_z and e.elpd_diff > max(decoy_threshold, least)
 
+    def certain(self, problem: Problem, before: Fit, after: Fit) -> bool:
+        """Whether the gain on held-out trials from one fit to another is certain, however small it is."""
+        gain = problem.paired_comparison(before, after)
+        return gain.p_value < self._level and gain.z > self._least_z
+
     def earned_over(self, problem: Problem, lacking: Fit, fit: Fit, name: str) -> bool:
         """Whether an effect of a fit has `earned` its place over the fit that lacks it."""
         return self.earned(Candidate(name, fit, problem.paired_comparison(lacking, fit)), lacking, 0.0)

@@ -64,15 +64,17 @@ class LookBack:
         """One effect in the place of two that both look like it, if it predicts trials held out better.
 
         A short lag is, to one half, a late clock, and to the other a limit of the acceleration. A search that took the one has a
-        use for the other next, and no exchange of one effect leads from there to the lag. Not asked of bodies, whose fits take
-        minutes.
+        use for the other next, and no exchange of one effect leads from there to the lag. One that has a number more than the two
+        must be better for certain: friction that ends turns is a loss of turn rate, and a lag that is shorter in turns. Not asked
+        of bodies, whose fits take minutes.
         """
         best, new = fit, accepted
         for pair in combinations(accepted, 2) if self._predictor.screening is None else ():
             alike = set.intersection(*(set(self._catalogue[name].lookalikes) for name in pair))
             for name in sorted(alike.intersection(self._catalogue) - set(accepted)):
                 for one, tried in self._merged(problem, fit, pair, name):
-                    if tried.held_out.sum() < best.held_out.sum() - 0.5 and self._acceptance.may_stay(problem, tried, one):
+                    better = tried.held_out.sum() < best.held_out.sum() - 0.5 and self._acceptance.may_stay(problem, tried, one)
+                    if better and (len(tried.free) <= len(fit.free) or self._acceptance.certain(problem, fit, tried)):
                         best, new = tried, (*(a for a in accepted if a not in pair), one)
         if new == accepted:
             return problem, fit, accepted
@@ -83,8 +85,8 @@ class LookBack:
         return merged, settled, new
 
     def _merged(self, problem: Problem, fit: Fit, pair: tuple[str, str], name: str) -> Iterator[tuple[str, Fit]]:
-        """An effect in the place of two, then each that extends it; none with more numbers than these have together."""
-        most = sum(len(self._catalogue[one].parameters) for one in pair)
+        """An effect in the place of two, then each that extends it; with one number more than these have together at most."""
+        most = 1 + sum(len(self._catalogue[one].parameters) for one in pair)
         base = problem.fit(fit.model.without(pair[0]).without(pair[1]))
         simple_fit = fit_with(problem, base, self._catalogue[name])
         yield name, simple_fit

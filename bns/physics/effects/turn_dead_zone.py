@@ -25,7 +25,7 @@ EFFECT = Effect(
     parameters=(Parameter("width_rad_s", "rad/s", 0.0, 5.0, (0.0, 0.5), 0.0, "turn rate lost to friction"),),
     equation="omega' = sign(omega)·max(|omega| - c, 0)",
     residuals="Slow turns fall short by a larger fraction than fast ones; slight curves are driven straight.",
-    lookalikes=("wheelbase", "dead-zone", "understeer"),
+    lookalikes=("wheelbase", "dead-zone", "understeer", "motor-lag"),
     sentence="turning loses a constant part of its rate to friction",
     sized="turning loses {width_rad_s} of its rate to friction",
     measurement="turn on the spot ever faster, and note the command at which the robot begins to turn",

@@ -154,3 +154,31 @@ def _zero(end: float, first: float, second: float, first_s: float, second_s: flo
 @exact
 def _sum(end: float, first: float, second: float, first_s: float, second_s: float, t: float) -> float:
     return end + first * np.exp(-t / first_s) + second * np.exp(-t / second_s)
+
+
+@exact
+def braked(target: Array, step_s: Array, tau_s: float, friction: float) -> Array:
+    """Mean over each step of w from rest, where tau·dw/dt = target - w - friction·sign(w), held at rest up to friction; exact."""
+    mean = np.zeros_like(target)
+    for row in range(target.shape[0]):
+        w = 0.0
+        for k in range(target.shape[1]):
+            h, u = step_s[row, k], target[row, k]
+            if h == 0.0:
+                continue
+            if tau_s == 0.0:
+                w = np.sign(u) * max(abs(u) - friction, 0.0)
+                mean[row, k] = w
+                continue
+            rest_s, way = h, 0.0
+            end = u - friction * np.sign(w)
+            if end * w < 0.0:  # it comes to rest first
+                stop_s = tau_s * np.log1p(-w / end)
+                if stop_s < h:
+                    rest_s, way, w = h - stop_s, end * stop_s + w * tau_s, 0.0
+            if w == 0.0:
+                end = np.sign(u) * max(abs(u) - friction, 0.0)
+            settled = -np.expm1(-rest_s / tau_s)
+            mean[row, k] = (way + end * rest_s + (w - end) * settled * tau_s) / h
+            w += (end - w) * settled
+    return mean

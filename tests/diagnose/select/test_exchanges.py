@@ -349,16 +349,18 @@ def test_behind_one_that_lowers_no_error_nothing_comes_in_that_lowers_none_eithe
 
 
 @pytest.mark.parametrize(
-    ("held_out", "stays", "ends"),
+    ("held_out", "stays", "certain", "ends"),
     [
-        ({"lag": 9.4}, True, ("c", "lag")),
-        ({"lag": 9.6}, True, ("a", "b", "c")),
-        ({"lag": 9.4}, False, ("a", "b", "c")),
-        ({"lag": 9.4, "turn-lag": 8.8}, True, ("c", "turn-lag")),
-        ({"lag": 9.4, "gears": 8.0}, True, ("c", "lag")),  # four numbers in the place of two
+        ({"lag": 9.4}, True, False, ("c", "lag")),
+        ({"lag": 9.6}, True, True, ("a", "b", "c")),
+        ({"lag": 9.4}, False, True, ("a", "b", "c")),
+        ({"lag": 9.4, "turn-lag": 8.8}, True, False, ("c", "turn-lag")),
+        ({"lag": 9.4, "gears": 8.0}, True, True, ("c", "lag")),  # four numbers in the place of two
+        ({"lag": 9.4, "scrub": 8.0}, True, True, ("c", "scrub")),  # one more than two, and better for certain
+        ({"lag": 9.4, "scrub": 8.0}, True, False, ("c", "lag")),
     ],
 )
-def test_one_effect_takes_the_place_of_two_that_look_like_it(monkeypatch, held_out, stays, ends):
+def test_one_effect_takes_the_place_of_two_that_look_like_it(monkeypatch, held_out, stays, certain, ends):
     search = LookBack.__new__(LookBack)
     search._predictor, search._tick = SimpleNamespace(screening=None), lambda _: None
     search._catalogue = {
@@ -368,16 +370,18 @@ def test_one_effect_takes_the_place_of_two_that_look_like_it(monkeypatch, held_o
         "lag": an_effect("lag", 1),
         "turn-lag": an_effect("turn-lag", 2, "lag"),
         "gears": an_effect("gears", 4, "lag"),
+        "scrub": an_effect("scrub", 3, "lag"),
     }
     search._worth = search._catalogue
-    fits = {name: SimpleNamespace(held_out=np.array([loss]), model=name) for name, loss in held_out.items()}
+    free = {name: "x" * (1 + len(effect.parameters)) for name, effect in search._catalogue.items()}  # and that of c
+    fits = {name: SimpleNamespace(held_out=np.array([loss]), model=name, free=free[name]) for name, loss in held_out.items()}
     worse = SimpleNamespace(held_out=np.array([99.0]), model="")
     monkeypatch.setattr(look_back, "fit_with", lambda _problem, _base, effect: fits.get(effect.name, worse))
     monkeypatch.setattr(look_back, "fit_extended", lambda _problem, _base, effect: fits.get(effect.name, worse))
-    search._acceptance = SimpleNamespace(rejected=lambda *_, **__: "", may_stay=lambda *_: stays)
+    search._acceptance = SimpleNamespace(rejected=lambda *_, **__: "", may_stay=lambda *_: stays, certain=lambda *_: certain)
     monkeypatch.setattr(look_back, "settled_problem", lambda _predictor, model, _: ("problem", fits[model]))
     without = SimpleNamespace(without=lambda _: without)
-    fit = SimpleNamespace(held_out=np.array([10.0]), model=without)
+    fit = SimpleNamespace(held_out=np.array([10.0]), model=without, free="abc")
     problem = SimpleNamespace(fit=lambda _: None, pose_filter=SimpleNamespace(noise=None))
     assert search.merge_step(problem, fit, ("a", "b", "c"))[2] == ends
     search._predictor = SimpleNamespace(screening=object())
