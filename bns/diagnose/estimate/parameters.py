@@ -30,10 +30,11 @@ class FreeParameter:
 
 def moved_by(model: Model, free: Sequence[FreeParameter], step: Array) -> Model:
     """The model with its free numbers moved, held within their bounds."""
-    values = {f.effect: dict(model.values_of(f.effect)) for f in free}
+    values = {name: dict(model.values_of(name)) for name in {f.effect for f in free}}
     for number, change in zip(free, step, strict=True):
-        p = number.parameter
-        values[number.effect][p.name] = float(np.clip(number.of(model) + change, p.low, p.high))
+        p, of = number.parameter, values[number.effect]
+        moved = float(of[p.name] + change)
+        of[p.name] = p.low if moved < p.low else p.high if moved > p.high else moved
     return model.with_values(values)
 
 

@@ -41,6 +41,7 @@ _STATEFUL = (
 )
 """Effects behind a delay of commands to which it makes no difference whether the delay is before or behind them."""
 
+_PLAIN = Model(1.0)
 Chain = tuple[tuple[Effect, tuple[float, ...], tuple[float, ...]], ...]
 """Effects that act, their values, and those of each trial."""
 
@@ -280,13 +281,11 @@ def _chain(model: Model, stages: Sequence[str]) -> Chain:
 
 
 def _model_of(wheelbase_m: float, chain: Chain) -> Model:
-    return Model(
-        wheelbase_m,
-        tuple(
-            ActiveEffect(e, values, per_trial=bool(trial_values), trial_values=trial_values)
-            for e, values, trial_values in chain
-        ),
+    """Of effects that were checked in the model that they come from."""
+    effects = tuple(
+        ActiveEffect(e, values, per_trial=bool(trial_values), trial_values=trial_values) for e, values, trial_values in chain
     )
+    return _PLAIN.derived(wheelbase_m=wheelbase_m, effects=effects)
 
 
 def predictor_for_search(tracks: Tracks) -> WheelPredictor:
