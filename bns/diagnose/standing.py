@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from scipy.special import stdtrit
+
 from bns.diagnose.estimate.cross_validation import Judged, judged_errors
+from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.predict.base import Predictor
@@ -16,8 +19,10 @@ from bns.diagnose.residuals.floor_field import imitating_floor
 from bns.diagnose.residuals.unexplained import Unexplained, unexplained
 from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.result import SelectionResult
+from bns.diagnose.settings import DEFAULTS
 from bns.physics.model import Model
 
+FALSE_ALARM = DEFAULTS.select.false_alarm
 WITH_EFFECTS = "with the effects"
 """The name of the refitted model in tables of errors."""
 
@@ -40,6 +45,8 @@ def standing_of(
     """The effects of a selection with which the held-out error falls: all, or those left when the worst were withdrawn."""
     tick("errors on trials held out")
     selection = refitted(selection, predictor, given)
+    while uncertain := least_certain(selection):
+        selection = refitted(selection.lacking((uncertain,)), predictor, given)
     errors = errors_before_and_after(selection, given)
     searched = selection.accepted
     while withdraw and selection.accepted and not errors.falls:
@@ -48,6 +55,33 @@ def standing_of(
     tick("what is left")
     dependence = residual_dependence(selection.problem, selection.fit)
     return Standing(selection, errors, withdrawn, dependence, unexplained(selection.problem, selection.fit, dependence))
+
+
+def least_certain(selection: SelectionResult) -> str:
+    """The accepted effect of a body that is the farthest from certain where the body is simulated itself; "" if all are certain.
+
+    A search reads from curves what an effect gains. They miss the small valleys of the loss, which the last step of a fit knows
+    of (`estimate/profiles.py`): there, too, one number at least must be told from neutral at the level that a search asks for.
+    """
+    fit, step = selection.fit, selection.steps[0] if selection.steps else None
+    if selection.problem.predictor.luck is None or step is None:
+        return ""
+    freedom = max(len(fit.losses) - len(fit.free), 1)
+    level = FALSE_ALARM / max(step.of, len(step.ranking), 1)
+    needed = float(stdtrit(freedom, 1.0 - level / 2.0) / stdtrit(freedom, 0.975))
+    farthest: dict[str, float] = {}
+    for name in selection.accepted:
+        own = [j for j, number in enumerate(fit.free) if number.effect == name]
+        if own and all(j in fit.spans for j in own):
+            farthest[name] = max(_intervals_away(fit, j) for j in own)
+    least = min(farthest, key=lambda name: farthest[name], default="")
+    return least if least and farthest[least] < needed else ""
+
+
+def _intervals_away(fit: Fit, j: int) -> float:
+    """How far a number is from neutral, in halves of its 95 % interval."""
+    p, value, (low, high) = fit.free[j].parameter, float(fit.values[j]), fit.spans[j]
+    return p.apart(p.neutral, value) / max(p.apart(low, value), p.apart(high, value), 1e-12)
 
 
 def _without_the_worst(
