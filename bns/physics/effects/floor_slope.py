@@ -29,6 +29,7 @@ EFFECT = Effect(
         "tether-pull": "A floor-slope is a tether-pull from far away: to tell them apart, drive on both sides of the "
         "assumed anchor."
     },
+    revision=2,
     apply=apply,
     needs="track",
 )

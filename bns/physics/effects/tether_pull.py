@@ -42,6 +42,7 @@ EFFECT = Effect(
     lookalikes=("floor-slope",),
     sentence="something pulls the robot towards one point, as a cable does",
     measurement="repeat some trials with the cable unplugged or held up",
+    revision=2,
     apply=apply,
     needs="track",
     starts=_starts(),

@@ -23,5 +23,6 @@ EFFECT = Effect(
     sentence="the robot turns to one side at a constant rate whenever it moves",
     sized="the robot turns {rate_rad_s:to the left|to the right} whenever it moves",
     measurement="lift the robot, command equal speeds, and log both wheels' own speeds (encoders)",
+    revision=2,
     apply=apply,
 )
