@@ -20,7 +20,7 @@ from bns.diagnose.effect_caveats import (
     on_the_cone,
 )
 from bns.diagnose.estimate.cancelling import cancelled
-from bns.diagnose.estimate.plausibility import with_unit
+from bns.diagnose.estimate.plausibility import does_no_more, with_unit
 from bns.diagnose.estimate.single_wheel import single_wheel
 from bns.diagnose.outcome import Outcome
 from bns.diagnose.predict.horizons import IN_WORDS
@@ -102,8 +102,14 @@ def notes_on(
         more = int(np.ceil(len(tracks) * max((3.2 / max(hint.paired_comparison.z, 0.5)) ** 2 - 1, 0.5)))
         few = f"{hint.name} may be missing, but {len(tracks)} trials are too few to decide; about {more} more would decide."
         yield few + finer(tracks.duration_s.sum(axis=1))
-    for c in selection.steps[0].ranking if not selection.accepted else ():  # what is found explains the others' odd numbers
-        if c.rejected_because and c.paired_comparison.elpd_diff > NOTABLE * float(selection.nominal.losses.mean()):
+    yield from _on_odd_numbers(selection)
+
+
+def _on_odd_numbers(selection: SelectionResult) -> Iterator[str]:
+    """On effects that no robot has with such numbers; nothing where an effect is accepted: it explains the others' odd numbers."""
+    least = NOTABLE * float(selection.nominal.losses.mean())
+    for c in selection.steps[0].ranking if not selection.accepted else ():
+        if c.rejected_because and c.paired_comparison.elpd_diff > least and not does_no_more(c.fit, c.name):
             yield (
                 f"{c.name} would lower the error, but is no explanation: fitted, {c.rejected_because}. If a measurement of your "
                 "own says that this is so, add the effect all the same (bns add)."
@@ -171,19 +177,24 @@ def _on_slight(unseen: bool, slight: Sequence[str]) -> Iterator[str]:
 
 def _on_rejected(terms: Sequence[str], with_terms: PairedErrors) -> str:
     """On terms that fit, and with which the error on held-out trials rises, or does not fall."""
-    risen = with_terms.rose_in_the_end
+    risen, of_most = with_terms.rose_in_the_end, with_terms.median_rose_in_the_end
     fallen = [horizon for horizon in with_terms.fell_in_the_end if horizon not in risen]
-    rose, fell = (" and ".join(IN_WORDS.get(h, h) for h in names) for names in (risen, fallen))
-    though = f", though it falls over {fell}" if fell else ""
+    by_rms = [horizon for horizon in risen if horizon not in of_most]
+    fell = _horizons(fallen)
     what = "a free term fits best that says" if len(terms) == 1 else "free terms fit best that say"
     them = "it" if len(terms) == 1 else "them"
     begun = f"Of what no listed effect explains {what}: {'; '.join(terms)}. With {them} the error on "
     if not risen:
         return f"{begun}held-out trials does not fall where its change is surest, so the extended model does without."
-    return (
-        f"{begun}held-out trials (root mean square or median) rises over {rose}{though}. So something else happens, and the "
-        "extended model does without."
-    )
+    said = [f"rises over {_horizons(by_rms)}"] if by_rms else []
+    if of_most:
+        said.append(f"has a higher median over {_horizons(of_most)} (most windows are predicted worse)")
+    though = f", though {'it' if by_rms else 'its root mean square'} falls over {fell}" if fell else ""
+    return f"{begun}held-out trials {' and '.join(said)}{though}. So something else happens, and the extended model does without."
+
+
+def _horizons(names: Sequence[str]) -> str:
+    return " and ".join(IN_WORDS.get(horizon, horizon) for horizon in names)
 
 
 def _on_rest(rest: Unexplained, tracks: Tracks) -> Iterator[str]:

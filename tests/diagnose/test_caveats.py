@@ -12,6 +12,7 @@ import bns.diagnose.diagnosis as said_by
 from bns.api.diagnose import DiagnoseResult
 from bns.cli.commands.diagnose import _which
 from bns.diagnose.caveats import (
+    _on_odd_numbers,
     _on_reach,
     _on_rejected,
     _on_rest,
@@ -23,6 +24,7 @@ from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosing import diagnose
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.effect_caveats import _on_drift, _on_times, implausible_text, on_effects
+from bns.diagnose.estimate.parameters import FreeParameter
 from bns.diagnose.estimate.smoothing_tracker import SmoothingTracker
 from bns.diagnose.predict.paired_errors import Change, HorizonErrors, ModelError, PairedErrors
 from bns.diagnose.predict.wheels import WheelPredictor
@@ -37,16 +39,51 @@ MODELS = (SimpleNamespace(rms_m=0.1), SimpleNamespace(rms_m=0.1))
 
 
 @pytest.mark.parametrize(
-    ("rose", "fell", "said"),
+    ("rose", "medians", "fell", "said"),
     [
-        (("trial",), ("command", "1s"), "rises over the whole trial, though it falls over one command and 1 second"),
-        (("5s", "trial"), (), "rises over 5 seconds and the whole trial. So something else happens, and the extended model"),
-        (("1s",), ("1s",), "With it the error on held-out trials (root mean square or median) rises over 1 second. So"),
-        ((), (), "With it the error on held-out trials does not fall where its change is surest, so"),
+        (("trial",), (), ("command", "1s"), "rises over the whole trial, though it falls over one command and 1 second"),
+        (("5s", "trial"), (), (), "rises over 5 seconds and the whole trial. So something else happens, and the extended model"),
+        (("1s",), (), ("1s",), "With it the error on held-out trials rises over 1 second. So"),
+        (
+            ("1s",),
+            ("1s",),
+            ("1s", "5s"),
+            "the error on held-out trials has a higher median over 1 second (most windows are predicted worse), though its root "
+            "mean square falls over 5 seconds. So",
+        ),
+        (
+            ("1s", "trial"),
+            ("1s",),
+            ("5s",),
+            "rises over the whole trial and has a higher median over 1 second (most windows are predicted worse), though it",
+        ),
+        ((), (), (), "With it the error on held-out trials does not fall where its change is surest, so"),
     ],
 )
-def test_a_term_with_which_an_error_rises_must_not_be_added(rose, fell, said):
-    assert said in _on_rejected(["it slows down"], SimpleNamespace(rose_in_the_end=rose, fell_in_the_end=fell))
+def test_a_term_with_which_an_error_rises_must_not_be_added(rose, medians, fell, said):
+    errors = SimpleNamespace(rose_in_the_end=rose, median_rose_in_the_end=medians, fell_in_the_end=fell)
+    assert said in _on_rejected(["it slows down"], errors)
+
+
+def test_an_effect_that_no_robot_has_with_such_numbers_is_told_unless_it_is_a_simpler_one():
+    (parameter,) = effect_named("turn-dead-zone").parameters
+
+    def tried(value, gain, why):
+        fit = SimpleNamespace(free=(FreeParameter("turn-dead-zone", parameter),), values=[value])
+        earned = SimpleNamespace(elpd_diff=gain)
+        return SimpleNamespace(name="turn-dead-zone", fit=fit, rejected_because=why, paired_comparison=earned)
+
+    def said(one, accepted=()):
+        nominal = SimpleNamespace(losses=np.full(20, 100.0))
+        step = SimpleNamespace(ranking=(one,))
+        return list(_on_odd_numbers(SimpleNamespace(steps=[step], nominal=nominal, accepted=accepted)))
+
+    (note,) = said(tried(5.0, 50.0, "width_rad_s is at its bound, 5 rad/s"))
+    assert note.startswith("turn-dead-zone would lower the error, but is no explanation: fitted, width_rad_s is at its bound")
+    assert not said(tried(0.0, 50.0, "width_rad_s is at its bound, 0 rad/s"))
+    assert not said(tried(5.0, 50.0, ""))
+    assert not said(tried(5.0, 1e-3, "width_rad_s is at its bound, 5 rad/s"))
+    assert not said(tried(5.0, 50.0, "width_rad_s is at its bound, 5 rad/s"), accepted=("motor-lag",))
 
 
 def test_an_error_that_may_have_changed_by_luck_neither_fell_nor_rose():
@@ -54,6 +91,11 @@ def test_an_error_that_may_have_changed_by_luck_neither_fell_nor_rose():
     each = {h: SimpleNamespace(total=None, changes=(change,), models=MODELS) for h, change in changes.items()}
     errors = PairedErrors(each, None, 20)
     assert (errors.fell_in_the_end, errors.rose_in_the_end) == (("command",), ("trial",))
+    assert not errors.median_rose_in_the_end
+    each["1s"] = SimpleNamespace(total=None, changes=(Change(-0.01, -0.02, 0.01, median_rose=True),), models=MODELS)
+    each["trial"] = SimpleNamespace(total=None, changes=(Change(0.1, 0.05, 0.2, median_rose=True),), models=MODELS)
+    assert errors.median_rose_in_the_end == ("1s",)
+    assert errors.rose_in_the_end == ("1s", "trial")
 
 
 @pytest.mark.parametrize(

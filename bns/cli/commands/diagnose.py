@@ -150,7 +150,8 @@ def _where_written(options: argparse.Namespace, found: DiagnoseResult) -> str:
     extended = found.extended
     if options.output is not None:
         if extended is None:
-            return f"\nNothing was found to add, so {options.output} was not written.\n"
+            what = "Nothing that was found lowers the error" if found.verdict == "unlisted" else "Nothing was found to add"
+            return f"\n{what}, so {options.output} was not written.\n"
         return f"\n{_written(options)}{_which(found)}\n"
     if extended is None:
         return ""

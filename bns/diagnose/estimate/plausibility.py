@@ -27,6 +27,12 @@ def at_bound(fit: Fit, name: str) -> bool:
     return any(_stopped(p, value) for p, value in numbers)
 
 
+def does_no_more(fit: Fit, name: str) -> bool:
+    """Whether a number of an effect ended at a bound that is its neutral value: the effect does no more than a simpler one."""
+    pairs = zip(fit.free, fit.values, strict=True)
+    return any(n.effect == name and _stopped(n.parameter, float(v)) and float(v) == n.parameter.neutral for n, v in pairs)
+
+
 def implausible(fit: Fit, name: str, bounds: bool = True) -> str:
     """Why an effect with these numbers cannot be believed; "" if it can. ``bounds``: do numbers at one count?"""
     for index, number in enumerate(fit.free):

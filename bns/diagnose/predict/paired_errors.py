@@ -152,6 +152,12 @@ class PairedErrors:
         """Horizons at which it, or its median, certainly rises there, by `least_fall` or more."""
         return tuple(h for h, e in self.horizons.items() if e.changes and _rises(e.changes[-1], e.models[-2].rms_m))
 
+    @property
+    def median_rose_in_the_end(self) -> tuple[str, ...]:
+        """Horizons at which the median certainly rises there, and the root mean square does not."""
+        at = {h: e.changes[-1] for h, e in self.horizons.items() if e.changes}
+        return tuple(h for h, change in at.items() if change.median_rose and not change.rose)
+
     def between(self, before: str, after: str) -> bool:
         """Does the error fall from one model to the one that follows it?
 

@@ -47,7 +47,7 @@ def _alone(number: Mapping[str, Any]) -> bool:
 def _said(p: Parameter, number: Mapping[str, Any], words: str) -> Iterator[str]:
     """A number alone; with ``words`` ("above|below") how far it is from neutral, and to which side; nothing if that is open.
 
-    With a plus before the words a side is said even then: a place has two coordinates, and one of them may be 0.
+    With a plus before the words the number is said even then: a place has two coordinates, and one of them may be 0.
     """
     value, low, high = (number.get(key) for key in ("value", "low", "high"))
     if value is None or not np.isfinite(value) or not _alone(number):
@@ -59,6 +59,9 @@ def _said(p: Parameter, number: Mapping[str, Any], words: str) -> Iterator[str]:
     if (value == p.neutral or open_side) and not words.startswith("+"):
         return
     above, below, *only = words.removeprefix("+").split("|")
+    if open_side and low is not None and high is not None and np.isfinite(low) and np.isfinite(high):
+        yield f"at most {_size(max(p.neutral - low, high - p.neutral), p)} {above} or {below}"
+        return
     side = above if value >= p.neutral else below
     if only:
         yield side

@@ -31,12 +31,23 @@ def wandering_m(predictor: Predictor, noise: Array, horizon: str) -> float:
     return float(np.sqrt(np.mean(squares))) if squares else float("nan")
 
 
+def _longer(predictor: Predictor, noise: Array, errors: PairedErrors, horizon: str) -> float:
+    """By what factor the drive scatters more over a horizon than from pose to pose; at least 1."""
+    at, by_drive = errors.horizons[horizon], wandering_m(predictor, noise, horizon)
+    beyond = at.models[-1].rms_m ** 2 - at.noise_floor_m**2
+    return max(float(np.sqrt(beyond)) / by_drive, 1.0) if beyond > 0 and by_drive > 0 else 1.0
+
+
 def scatter_in_words(predictor: Predictor, noise: Array, errors: PairedErrors) -> list[str]:
-    """A sentence where the error at the longest horizon is far above tracking noise: does the drive's scatter make it?"""
-    longest = [horizon for horizon, at in errors.horizons.items() if at.windows][-1:]
-    if not longest:
+    """A sentence where the error at the longest horizon is far above tracking noise: does the drive's scatter make it?
+
+    Wheels whose speeds vary over parts of a second scatter little from pose to pose, and more over seconds: what the scatter
+    makes is then read from the next shorter horizon. What differs from trial to trial grows faster than a walk at random does.
+    """
+    judged = [horizon for horizon, at in errors.horizons.items() if at.windows]
+    if not judged:
         return []
-    horizon = longest[0]
+    horizon = judged[-1]
     at = errors.horizons[horizon]
     error, floor = at.models[-1].rms_m, at.noise_floor_m
     by_drive = wandering_m(predictor, noise, horizon)
@@ -51,6 +62,15 @@ def scatter_in_words(predictor: Predictor, noise: Array, errors: PairedErrors) -
             "that shifts its poses at times (a hidden marker, a seam between two cameras) rather than for wheels that slip."
         ]
     if explained <= EXPLAINS:
+        over = judged[-2] if len(judged) > 1 else horizon
+        longer = by_drive * _longer(predictor, noise, errors, over)
+        if 1.0 / EXPLAINS > np.hypot(longer, floor) / error > EXPLAINS:
+            return [
+                f"The error over {IN_WORDS[horizon]} ({1e3 * error:.3g} mm) is above tracking noise ({1e3 * floor:.3g} mm) "
+                f"because the drive itself scatters: the error over {IN_WORDS[over]}, if it is a walk at random, makes "
+                f"{1e3 * longer:.3g} mm of it. From pose to pose it scatters less ({1e3 * by_drive:.3g} mm), as wheels do whose "
+                "speeds vary over parts of a second. No listed effect and no curve finds a pattern in it."
+            ]
         return [
             f"The error over {IN_WORDS[horizon]} ({1e3 * error:.3g} mm) is far above tracking noise ({1e3 * floor:.3g} mm), and "
             f"a drive that scatters as this one does from pose to pose makes only {1e3 * by_drive:.3g} mm. "

@@ -10,10 +10,14 @@ missing at a steady command. J is that of both wheels of one body, as in `inerti
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Array, Wheels
 from bns.physics.wheels.friction import braked_together
 from bns.physics.wheels.scans import first_order
+
+_NOTABLE_LOSS = 0.05
 
 
 def apply(wheels: Wheels, tau_s: float, turn_ratio: float, friction_m_s: float, loss_m_s: float) -> Wheels:
@@ -25,6 +29,16 @@ def apply(wheels: Wheels, tau_s: float, turn_ratio: float, friction_m_s: float, 
     values = tau_s, turn_ratio, friction_m_s, loss_m_s
     left_m_s, right_m_s = braked_together(wheels.left_m_s, wheels.right_m_s, wheels.step_s, *values)
     return wheels.following(left_m_s, right_m_s, late)
+
+
+def sized_by(values: Mapping[str, float]) -> str:
+    """With what is missing at a steady command, where that is a notable part of the friction."""
+    lag_ms, friction_mm_s, loss_mm_s = (1e3 * values[name] for name in ("tau_s", "friction_m_s", "loss_m_s"))
+    said = (
+        f"the motors follow their commands with a lag of {lag_ms:.3g} ms on straight lines, and friction in the gears, which "
+        f"takes {friction_mm_s:.3g} mm/s from a wheel that coasts, ends a motion sooner"
+    )
+    return said if loss_mm_s < _NOTABLE_LOSS * friction_mm_s else f"{said}; at a steady command {loss_mm_s:.3g} mm/s are missing"
 
 
 EFFECT = Effect(
@@ -56,8 +70,7 @@ EFFECT = Effect(
     "the most abruptly.",
     lookalikes=("motor-lag", "inertia-lag", "dead-zone", "acceleration-limit"),
     sentence="friction in the gears ends a motion sooner than the motors alone would",
-    sized="the motors follow their commands with a lag of {tau_s} on straight lines, and friction in the gears, which takes "
-    "{friction_m_s} from a wheel that coasts, ends a motion sooner",
+    sized_by=sized_by,
     measurement="log the wheels' own speeds (encoders) fast, from a command to stop until they stand; at several speeds",
     apply=apply,
     needs="track",

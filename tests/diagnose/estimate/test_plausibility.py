@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from bns.diagnose.estimate.parameters import FreeParameter
-from bns.diagnose.estimate.plausibility import believable, fitted_again, implausible, limiting, undetermined
+from bns.diagnose.estimate.plausibility import believable, does_no_more, fitted_again, implausible, limiting, undetermined
 from bns.physics.effect import Parameter
 from tests.diagnose.worlds import NOMINAL
 
@@ -39,6 +39,15 @@ def test_a_number_at_its_bound_is_implausible_where_bounds_count():
     assert implausible(fit, "e") == "gain is at its bound, 9"
     assert implausible(fit, "e", bounds=False) == ""
     assert implausible(fit, "another") == ""
+
+
+def test_an_effect_with_a_number_at_a_bound_where_it_is_neutral_does_no_more_than_a_simpler_one():
+    width = Parameter("width", "m/s", 0.0, 1.0, (0.0, 0.1), 0.0, "")
+    assert does_no_more(fit_of(0.0, 0.0, 0.1, parameter=width), "e")
+    assert not does_no_more(fit_of(0.0, 0.0, 0.1, parameter=width), "another")
+    assert not does_no_more(fit_of(1.0, 0.0, 1.0, parameter=width), "e")  # at its other bound it does something
+    assert not does_no_more(fit_of(1.0, 0.9, 1.1), "e")  # neutral, and at no bound
+    assert not does_no_more(fit_of(0.0, 0.0, 0.1, parameter=replace(width, reached=(0.0,))), "e")
 
 
 @pytest.mark.parametrize(

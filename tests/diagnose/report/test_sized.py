@@ -61,7 +61,14 @@ def number(value, low=None, high=None, **more):
         ),
         (
             *("marker-offset", {"forward_m": number(-0.02, -0.021, -0.019), "left_m": number(0.0004, -0.001, 0.001)}),
-            "the tracked point is not the point about which the robot turns, but 20 mm behind it and 0.4 mm to its left",
+            "the tracked point is not the point about which the robot turns, but 20 mm behind it and at most 1 mm to its left or "
+            "to its right",
+        ),
+        (
+            "gear-friction",
+            {"tau_s": number(0.0602), "turn_ratio": number(1.0), "friction_m_s": number(0.0125), "loss_m_s": number(0.01197)},
+            "the motors follow their commands with a lag of 60.2 ms on straight lines, and friction in the gears, which takes "
+            "12.5 mm/s from a wheel that coasts, ends a motion sooner; at a steady command 12 mm/s are missing",
         ),
         (
             *("breakaway", {"threshold_m_s": number(0.075), "stop_ratio": number(0.47)}),
@@ -142,3 +149,8 @@ def test_a_sentence_that_leaves_a_side_open_is_followed_by_one_with_numbers():
     open_ones = [name for name, effect in LISTED.items() if "faster or slower" in effect.sentence]
     assert open_ones
     assert all(LISTED[name].sized for name in open_ones)
+
+
+def test_friction_that_is_made_up_for_at_a_steady_command_is_said_to_be_missing_only_while_a_wheel_coasts():
+    numbers = {"tau_s": number(0.1), "turn_ratio": number(1.0), "friction_m_s": number(0.03), "loss_m_s": number(0.001)}
+    assert sized_sentence(effect_named("gear-friction"), numbers).endswith("from a wheel that coasts, ends a motion sooner")

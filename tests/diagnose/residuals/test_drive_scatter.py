@@ -62,11 +62,13 @@ def test_what_was_driven_before_a_window_adds_nothing():
     assert both[0] == pytest.approx(both[1], rel=1e-12)
 
 
-def errors(rms_m, floor_m=0.002, windows=5):
-    models = (SimpleNamespace(rms_m=1.0), SimpleNamespace(rms_m=rms_m))
-    at = SimpleNamespace(models=models, noise_floor_m=floor_m, windows=windows)
+def errors(rms_m, floor_m=0.002, windows=5, shorter_m=0.0):
+    def judged(last_m):
+        models = (SimpleNamespace(rms_m=1.0), SimpleNamespace(rms_m=last_m))
+        return SimpleNamespace(models=models, noise_floor_m=floor_m, windows=windows)
+
     empty = SimpleNamespace(models=(SimpleNamespace(rms_m=np.nan),), noise_floor_m=np.nan, windows=0)
-    return SimpleNamespace(horizons={"command": at, "5s": at, "trial": empty})
+    return SimpleNamespace(horizons={"1s": judged(shorter_m), "5s": judged(rms_m), "trial": empty})
 
 
 def test_it_is_said_where_it_makes_the_error_and_the_error_is_above_noise():
@@ -86,6 +88,35 @@ def test_it_is_said_where_it_makes_the_error_and_the_error_is_above_noise():
     assert scatter_in_words(predictor, NOISE, errors(by_drive, floor_m=0.6 * by_drive)) == []  # near noise: no question
     assert scatter_in_words(predictor, NOISE, errors(by_drive, floor_m=np.nan)) == []
     assert scatter_in_words(predictor, NOISE, SimpleNamespace(horizons={})) == []
+
+
+def two_horizons():
+    """One second is a third of the path, five are all of it."""
+    predictor = robot(curved(), [(0, 199)])
+    windows = {"1s": ([0], [66]), "5s": ([0], [199])}
+    predictor.windows = lambda horizon: windows[horizon]
+    return predictor, *(wandering_m(predictor, NOISE, horizon) for horizon in windows)
+
+
+def test_wheels_that_vary_over_parts_of_a_second_scatter_more_over_seconds_than_from_pose_to_pose():
+    predictor, short, whole = two_horizons()
+    (said,) = scatter_in_words(predictor, NOISE, errors(2.2 * whole, shorter_m=np.hypot(2.0 * short, 0.002)))
+    assert "because the drive itself scatters: the error over 1 second, if it is a walk at random" in said
+    assert f"makes {2e3 * whole:.3g} mm of it. From pose to pose it scatters less ({1e3 * whole:.3g} mm)" in said
+    for shorter_m in (1.2 * short, 0.001, 5.0 * short):  # too little, below the noise, and more than all
+        (said,) = scatter_in_words(predictor, NOISE, errors(2.2 * whole, shorter_m=shorter_m))
+        assert "trials may differ from one another" in said
+
+
+def test_what_differs_from_trial_to_trial_grows_faster_than_a_walk_at_random():
+    """Headings that turn away at a rate of their own in each trial: over six times the way, 36 times as far, not 15 times."""
+    way = np.column_stack([np.linspace(0, 6.0, 601), np.zeros(601)])
+    predictor = robot(way, [(0, 600)])
+    windows = {"1s": (np.arange(0, 600, 100), np.arange(100, 601, 100)), "5s": ([0], [600])}
+    predictor.windows = lambda horizon: windows[horizon]
+    bent = {horizon: 0.3 * length**2 / 2 for horizon, length in (("1s", 1.0), ("5s", 6.0))}
+    (said,) = scatter_in_words(predictor, NOISE, errors(bent["5s"], shorter_m=bent["1s"]))
+    assert "trials may differ from one another" in said
 
 
 def scattered(table, rng):
