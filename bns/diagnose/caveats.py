@@ -29,7 +29,7 @@ from bns.diagnose.residuals.grammar import PAST
 from bns.diagnose.residuals.outliers import FAR
 from bns.diagnose.residuals.unexplained import Unexplained
 from bns.diagnose.select.known_effects import known_effects
-from bns.diagnose.select.result import Candidate
+from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.jointed.model import JointedModel
 
@@ -106,7 +106,7 @@ def notes_on(
 
 
 def _on_odd_numbers(selection: SelectionResult) -> Iterator[str]:
-    """On effects that no robot has with such numbers; nothing where an effect is accepted: it explains the others' odd numbers."""
+    """On effects that no robot has with such numbers; nothing where an effect is accepted: it explains others' numbers."""
     least = NOTABLE * float(selection.nominal.losses.mean())
     for c in selection.steps[0].ranking if not selection.accepted else ():
         if c.rejected_because and c.paired_comparison.elpd_diff > least and not does_no_more(c.fit, c.name):

@@ -6,7 +6,14 @@ from types import SimpleNamespace
 import pytest
 
 from bns.diagnose.estimate.parameters import FreeParameter
-from bns.diagnose.estimate.plausibility import believable, does_no_more, fitted_again, implausible, limiting, undetermined
+from bns.diagnose.estimate.plausibility import (
+    believable,
+    does_no_more,
+    fitted_again,
+    implausible,
+    limiting,
+    undetermined,
+)
 from bns.physics.effect import Parameter
 from tests.diagnose.worlds import NOMINAL
 
