@@ -67,8 +67,8 @@ def scatter_in_words(predictor: Predictor, noise: Array, errors: PairedErrors) -
         if 1.0 / EXPLAINS > np.hypot(longer, floor) / error > EXPLAINS:
             return [
                 f"The error over {IN_WORDS[horizon]} ({1e3 * error:.3g} mm) is above tracking noise ({1e3 * floor:.3g} mm) "
-                f"because the drive itself scatters: the error over {IN_WORDS[over]}, if it is a walk at random, makes "
-                f"{1e3 * longer:.3g} mm of it. From pose to pose it scatters less ({1e3 * by_drive:.3g} mm), as wheels do whose "
+                f"because the drive itself scatters: grown as a walk at random grows, the error over {IN_WORDS[over]} makes "
+                f"{1e3 * longer:.3g} mm. From pose to pose it scatters less ({1e3 * by_drive:.3g} mm), as wheels do whose "
                 "speeds vary over parts of a second. No listed effect and no curve finds a pattern in it."
             ]
         return [

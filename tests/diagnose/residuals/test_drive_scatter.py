@@ -101,8 +101,8 @@ def two_horizons():
 def test_wheels_that_vary_over_parts_of_a_second_scatter_more_over_seconds_than_from_pose_to_pose():
     predictor, short, whole = two_horizons()
     (said,) = scatter_in_words(predictor, NOISE, errors(2.2 * whole, shorter_m=np.hypot(2.0 * short, 0.002)))
-    assert "because the drive itself scatters: the error over 1 second, if it is a walk at random" in said
-    assert f"makes {2e3 * whole:.3g} mm of it. From pose to pose it scatters less ({1e3 * whole:.3g} mm)" in said
+    assert "because the drive itself scatters: grown as a walk at random grows, the error over 1 second makes" in said
+    assert f"makes {2e3 * whole:.3g} mm. From pose to pose it scatters less ({1e3 * whole:.3g} mm)" in said
     for shorter_m in (1.2 * short, 0.001, 5.0 * short):  # too little, below the noise, and more than all
         (said,) = scatter_in_words(predictor, NOISE, errors(2.2 * whole, shorter_m=shorter_m))
         assert "trials may differ from one another" in said
