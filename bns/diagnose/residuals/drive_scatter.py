@@ -32,10 +32,10 @@ def wandering_m(predictor: Predictor, noise: Array, horizon: str) -> float:
 
 
 def _longer(predictor: Predictor, noise: Array, errors: PairedErrors, horizon: str) -> float:
-    """By what factor the drive scatters more over a horizon than from pose to pose; at least 1."""
+    """By what factor the drive scatters more over a horizon than from pose to pose; 1 where that cannot be told."""
     at, by_drive = errors.horizons[horizon], wandering_m(predictor, noise, horizon)
     beyond = at.models[-1].rms_m ** 2 - at.noise_floor_m**2
-    return max(float(np.sqrt(beyond)) / by_drive, 1.0) if beyond > 0 and by_drive > 0 else 1.0
+    return float(np.sqrt(beyond)) / by_drive if beyond > 0 and by_drive > 0 else 1.0
 
 
 def scatter_in_words(predictor: Predictor, noise: Array, errors: PairedErrors) -> list[str]:

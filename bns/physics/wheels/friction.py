@@ -166,10 +166,6 @@ def braked(target: Array, step_s: Array, tau_s: float, friction: float) -> Array
             h, u = step_s[row, k], target[row, k]
             if h == 0.0:
                 continue
-            if tau_s == 0.0:
-                w = np.sign(u) * max(abs(u) - friction, 0.0)
-                mean[row, k] = w
-                continue
             rest_s, way = h, 0.0
             end = u - friction * np.sign(w)
             if end * w < 0.0:  # it comes to rest first

@@ -388,6 +388,13 @@ def test_one_effect_takes_the_place_of_two_that_look_like_it(monkeypatch, held_o
     assert search.merge_step(problem, fit, ("a", "b", "c"))[2] == ("a", "b", "c")
 
 
+@pytest.mark.parametrize(("p_value", "z", "certain"), [(0.001, 3.0, True), (0.02, 3.0, False), (0.001, 1.9, False)])
+def test_a_gain_is_certain_by_the_signs_of_trials_and_by_its_standard_error_however_small_it_is(p_value, z, certain):
+    gain = SimpleNamespace(p_value=p_value, z=z, elpd_diff=1e-9)
+    problem = SimpleNamespace(paired_comparison=lambda before, after: gain if (before, after) == ("before", "after") else None)
+    assert Acceptance({}, level=0.01, least_z=2.0).certain(problem, "before", "after") == certain
+
+
 def test_where_nothing_comes_in_two_effects_may_give_way_to_one_and_the_search_goes_on(monkeypatch):
     search = StepwiseSelection.__new__(StepwiseSelection)
     search.model, search._exchanges = None, SimpleNamespace(entry=None)
