@@ -7,6 +7,7 @@ from importlib import resources
 import pytest
 
 from bns.errors import ModelError
+from bns.physics.effects import effect_named
 from bns.physics.model import Model, load_model, model_names
 
 TEXT = """
@@ -138,3 +139,40 @@ def test_digest_follows_the_text_of_a_formula_and_what_it_acts_on(tmp_path, old,
     other = loaded(tmp_path, TEXT + entry.replace(old, new))
     assert rub.values_of("rub") == other.values_of("rub")
     assert rub.digest != other.digest
+
+
+@pytest.mark.parametrize("value", [-0.1, 6.0, float("nan"), 1])
+def test_no_way_to_other_values_leads_out_of_bounds(value):
+    model = Model(0.1).with_effect("motor-lag", tau_s=0.1)
+    for other in (
+        lambda: model.with_values({"motor-lag": {"tau_s": value}}),
+        lambda: model.with_active(effect_named("motor-lag"), (value,)),
+    ):
+        if value == 1:
+            assert other().values_of("motor-lag") == {"tau_s": 1.0}
+        else:
+            with pytest.raises(ModelError, match=r"motor-lag: tau_s is .*; it must be a number from 0 to 5"):
+                other()
+
+
+def test_a_model_at_its_own_values_keeps_its_effects():
+    model = Model(0.1).with_effect("motor-lag", tau_s=0.1)
+    same = model.with_values({"motor-lag": {"tau_s": 0.1}})
+    assert same == model
+    assert same.effects[0] is model.effects[0]
+    moved = model.with_values({"motor-lag": {"tau_s": 0.2}})
+    assert moved.values_of("motor-lag") == {"tau_s": 0.2}
+    assert model.values_of("motor-lag") == {"tau_s": 0.1}
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("yaw-bias", {"rate_rad_s": 0.1}),
+        ("floor-slope", {"x_m_s": 0.01, "y_m_s": 0.0}),
+        ("tether-pull", {"pull_per_s": 0.1, "anchor_x_m": 0.0, "anchor_y_m": 0.0}),
+    ],
+)
+def test_what_acts_while_the_robot_moves_had_other_numbers_beside_late_wheels_once(name, values):
+    """So runs in worlds with it are not taken for those of today."""
+    assert f'"revisions":{{"{name}":2}}' in Model(0.1).with_effect(name, **values).canonical_json()
