@@ -62,7 +62,7 @@ def test_shipped_sweeps_can_be_read_and_are_named_after_their_file(file):
     totals |= {"approaches": 1200, "approaches-small": 48, "approaches-snake": 200, "approaches-tuning": 144}
     totals |= {"margin": 180, "options": 168, "worlds": 1440, "worlds-snake": 80, "random-behaviour": 80, "prototype-worlds": 180}
     totals |= {"noise": 240, "noise-physics": 90, "noise-tuning": 180, "noise-late": 120, "noise-late-tuning": 24}
-    totals |= {"noise-ensemble": 180, "noise-polish": 120, "noise-polish-tuning": 120}
+    totals |= {"noise-ensemble": 180, "noise-polish": 120, "noise-polish-tuning": 144}
     totals |= {"readings": 300, "readings-exact-durations": 120, "readings-penalty-3m": 60}
     totals |= dict.fromkeys(("readings-one-component", "readings-cuts-inside", "readings-flat-spot"), 60)
     assert sweep.total == totals[file.stem]
