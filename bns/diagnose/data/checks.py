@@ -55,7 +55,9 @@ def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     for trial, rows in rows_by_trial(table):
         at = rows[~spare[rows]]
         if not (_is_sound(t[at[own[at]]], pose[at[own[at]]]) and (np.diff(t[at]) > 0).all()):
-            good = _looked_through(trial, table.iloc[at], findings)
+            of_trial: list[Finding] = []
+            good = _looked_through(trial, table.iloc[at], of_trial)
+            findings += sorted(of_trial, key=lambda finding: finding.row)
             at = good.index.to_numpy()  # rows are numbered from 0
             pose[at] = good[list(POSE)].to_numpy()
         kept.append(at)

@@ -245,6 +245,15 @@ def test_gaps_repeats_and_losses_are_listed(table):
     assert len(usable) == len(odd) - 1
 
 
+def test_findings_of_a_trial_are_in_the_order_of_its_rows(table):
+    odd = table.copy()
+    odd.loc[30, "x_m"] += 0.3
+    odd.loc[[10, 11, 60], "x_m"] = np.nan
+    found = [f for f in checked(odd)[1] if f.trial == "0"]
+    assert [f.row for f in found] == [10, 30, 60]
+    assert ["jumps" in f.text for f in found] == [False, True, False]
+
+
 @pytest.mark.parametrize("pose_first", [True, False])
 def test_a_pose_and_a_command_of_one_time_are_one_row(table, pose_first):
     one = table[table.trial == 0].reset_index(drop=True)
