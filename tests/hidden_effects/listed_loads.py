@@ -148,11 +148,11 @@ class ScrubFriction(Cause):
 
     tau_s: float
     turn_ratio: float
-    friction_rad_s: float
+    width_rad_s: float
 
     def body(self, body: Body, moment: Moment) -> Body:
         small_s = moment.step_s / FINE
-        turn = _pushed(body.turn, small_s / self.tau_s / self.turn_ratio, self.friction_rad_s)
+        turn = _pushed(body.turn, small_s / self.tau_s / self.turn_ratio, self.width_rad_s)
         return body._replace(forward=_pushed(body.forward, small_s / self.tau_s, 0.0), turn=turn)
 
 

@@ -85,8 +85,8 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
         {"tau_s": 0.2, "turn_ratio": 0.5, "friction_m_s": 0.08, "loss_m_s": 0.01},
     ),
     "scrub-friction": (
-        {"tau_s": 0.08, "turn_ratio": 0.9, "friction_rad_s": 0.2},
-        {"tau_s": 0.2, "turn_ratio": 0.6, "friction_rad_s": 0.5},
+        {"tau_s": 0.08, "turn_ratio": 0.9, "width_rad_s": 0.2},
+        {"tau_s": 0.2, "turn_ratio": 0.6, "width_rad_s": 0.5},
     ),
     "sliding-contact": (
         {"friction_m_s": 0.006, "distance_share": 0.5, "left_share": 0.0},

@@ -64,19 +64,19 @@ def test_a_turn_coasts_for_the_lag_times_the_logarithm_and_then_stands():
 def test_straight_lines_lag_by_themselves_and_turns_lose_a_turn_rate():
     steps, base = np.full((1, 200), 0.05), 0.4
     left, right = np.full((1, 200), 0.1), np.full((1, 200), 0.3)
-    values = {"tau_s": 0.2, "turn_ratio": 0.5, "friction_rad_s": 0.15}
+    values = {"tau_s": 0.2, "turn_ratio": 0.5, "width_rad_s": 0.15}
     driven = effect_named("scrub-friction").apply(Wheels(steps, left, right, base), **values)
     way, turn = (driven.left_m_s + driven.right_m_s) / 2, (driven.right_m_s - driven.left_m_s) / base
     assert (way * steps).sum() == pytest.approx(0.2 * (10.0 - 0.2))
     assert (turn * steps).sum() == pytest.approx((0.5 - 0.15) * (10.0 - 0.1))
     np.testing.assert_allclose(driven.followed, first_order(np.ones((1, 200)), steps, 0.2))
     without = effect_named("inertia-lag").apply(Wheels(steps, left, right, base), tau_s=0.2, turn_ratio=0.5)
-    still = effect_named("scrub-friction").apply(Wheels(steps, left, right, base), **(values | {"friction_rad_s": 0.0}))
+    still = effect_named("scrub-friction").apply(Wheels(steps, left, right, base), **(values | {"width_rad_s": 0.0}))
     np.testing.assert_allclose(still.left_m_s, without.left_m_s, atol=1e-14)
 
 
 def test_the_second_implementation_agrees():
-    values = {"tau_s": 0.15, "turn_ratio": 0.5, "friction_rad_s": 0.3}
+    values = {"tau_s": 0.15, "turn_ratio": 0.5, "width_rad_s": 0.3}
     model = Model(wheelbase_m=0.1).with_effect("scrub-friction", **values)
     left, right, duration = [[0.2, 0.0, -0.1]], [[0.05, 0.02, 0.0]], [[0.5, 0.3, 0.6]]
     heading = simulate(model, left, right, duration)[0, :, 2]

@@ -14,14 +14,14 @@ from bns.physics.wheels.friction import braked
 from bns.physics.wheels.scans import first_order
 
 
-def apply(wheels: Wheels, tau_s: float, turn_ratio: float, friction_rad_s: float) -> Wheels:
+def apply(wheels: Wheels, tau_s: float, turn_ratio: float, width_rad_s: float) -> Wheels:
     """First-order lag of the wheels' mean; of their difference ``turn_ratio`` times that, with dry friction. From rest."""
 
     def late(values: Array) -> Array:
         return first_order(values, wheels.step_s, tau_s)
 
     half_m_s = (wheels.right_m_s - wheels.left_m_s) / 2
-    half_m_s = braked(half_m_s, wheels.step_s, tau_s * turn_ratio, friction_rad_s * wheels.wheelbase_m / 2)
+    half_m_s = braked(half_m_s, wheels.step_s, tau_s * turn_ratio, width_rad_s * wheels.wheelbase_m / 2)
     mean_m_s = late((wheels.left_m_s + wheels.right_m_s) / 2)
     return wheels.following(mean_m_s - half_m_s, mean_m_s + half_m_s, late)
 
@@ -34,7 +34,7 @@ EFFECT = Effect(
         Parameter(
             "turn_ratio", "1", 0.02, 20.0, (0.1, 5.0), 1.0, "time constant of turns on the spot, divided by that on lines"
         ),
-        Parameter("friction_rad_s", "rad/s", 0.0, 5.0, (0.0, 0.5), 0.0, "turn rate lost to friction"),
+        Parameter("width_rad_s", "rad/s", 0.0, 5.0, (0.0, 0.5), 0.0, "turn rate lost to friction"),
     ),
     equation="dm/dt = (mean of u - m)/tau for the wheels' mean m, dw/dt = (turn rate of u - w - c·sign(w))/(r·tau) for the turn "
     "rate w; friction up to c holds it at 0",
@@ -42,7 +42,7 @@ EFFECT = Effect(
     lookalikes=("motor-lag", "inertia-lag", "turn-dead-zone", "gear-friction"),
     sentence="the motors follow their commands with a lag, and friction with the floor brakes turns and ends them sooner",
     sized="the motors follow their commands with a lag of {tau_s} on straight lines, which is {turn_ratio:longer|shorter} in "
-    "turns; friction with the floor takes {friction_rad_s} from every turn, and ends it sooner",
+    "turns; friction with the floor takes {width_rad_s} from every turn, and ends it sooner",
     measurement="log a gyroscope at a high rate while the robot turns on the spot and stops, at several speeds",
     apply=apply,
     needs="track",

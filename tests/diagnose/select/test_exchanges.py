@@ -13,6 +13,8 @@ from bns.diagnose.select.look_back import LookBack
 from bns.diagnose.select.result import Candidate
 from bns.diagnose.select.stepwise import StepwiseSelection
 from bns.physics.decoys import DECOYS
+from bns.physics.effects import effect_named
+from tests.diagnose.worlds import NOMINAL
 
 
 def in_place(monkeypatch, start, fitted, lacking=1000.0, reached=0.0, known=()):
@@ -374,10 +376,11 @@ def test_one_effect_takes_the_place_of_two_that_look_like_it(monkeypatch, held_o
     }
     search._worth = search._catalogue
     free = {name: "x" * (1 + len(effect.parameters)) for name, effect in search._catalogue.items()}  # and that of c
-    fits = {name: SimpleNamespace(held_out=np.array([loss]), model=name, free=free[name]) for name, loss in held_out.items()}
-    worse = SimpleNamespace(held_out=np.array([99.0]), model="")
+    fits = {n: SimpleNamespace(held_out=np.array([one]), loss=one, model=n, free=free[n]) for n, one in held_out.items()}
+    worse = SimpleNamespace(held_out=np.array([99.0]), loss=99.0, model="")
     monkeypatch.setattr(look_back, "fit_with", lambda _problem, _base, effect: fits.get(effect.name, worse))
     monkeypatch.setattr(look_back, "fit_extended", lambda _problem, _base, effect: fits.get(effect.name, worse))
+    monkeypatch.setattr(look_back, "_from_their_numbers", lambda *_: None)
     search._acceptance = SimpleNamespace(rejected=lambda *_, **__: "", may_stay=lambda *_: stays, certain=lambda *_: certain)
     monkeypatch.setattr(look_back, "settled_problem", lambda _predictor, model, _: ("problem", fits[model]))
     without = SimpleNamespace(without=lambda _: without)
@@ -386,6 +389,34 @@ def test_one_effect_takes_the_place_of_two_that_look_like_it(monkeypatch, held_o
     assert search.merge_step(problem, fit, ("a", "b", "c"))[2] == ends
     search._predictor = SimpleNamespace(screening=object())
     assert search.merge_step(problem, fit, ("a", "b", "c"))[2] == ("a", "b", "c")
+
+
+def test_one_effect_in_the_place_of_two_begins_from_their_numbers():
+    model = NOMINAL.with_effect("motor-lag", tau_s=0.1)
+    model = model.with_active(effect_named("inertia-lag"), (0.02, 0.7)).with_effect("turn-dead-zone", width_rad_s=0.4)
+    fit, problem = SimpleNamespace(model=model), SimpleNamespace(fit=lambda one: one)
+    pair = ("turn-dead-zone", "inertia-lag")
+    begun = look_back._from_their_numbers(problem, fit, pair, effect_named("scrub-friction"))
+    assert [a.effect.name for a in begun.effects] == ["scrub-friction"]
+    assert begun.values_of("scrub-friction") == {"tau_s": 0.02, "turn_ratio": 0.7, "width_rad_s": 0.4}
+    begun = look_back._from_their_numbers(problem, fit, pair, effect_named("lag-mismatch"))
+    assert begun.values_of("lag-mismatch") == {"tau_s": 0.02, "ratio": 1.0}
+    assert look_back._from_their_numbers(problem, fit, pair, effect_named("speed-gain")) is None
+
+
+def test_the_lower_of_both_beginnings_counts(monkeypatch):
+    catalogue = {name: an_effect(name, 1) for name in ("a", "b", "lag")} | {"scrub": an_effect("scrub", 3, "lag")}
+    search = LookBack.__new__(LookBack)
+    search._catalogue = search._worth = catalogue
+    without = SimpleNamespace(without=lambda _: without)
+    fit, problem = SimpleNamespace(model=without), SimpleNamespace(fit=lambda _: None)
+    monkeypatch.setattr(look_back, "fit_with", lambda *_: "lag alone")
+    for extended, theirs, best in ((5.0, 3.0, 3.0), (2.0, 3.0, 2.0), (5.0, None, 5.0)):
+        of = [SimpleNamespace(loss=loss) if loss is not None else None for loss in (extended, theirs)]
+        monkeypatch.setattr(look_back, "fit_extended", lambda *_, found=of[0]: found)
+        monkeypatch.setattr(look_back, "_from_their_numbers", lambda *_, found=of[1]: found)
+        (_, simple), (name, found) = search._merged(problem, fit, ("a", "b"), "lag")
+        assert (simple, name, found.loss) == ("lag alone", "scrub", best)
 
 
 @pytest.mark.parametrize(("p_value", "z", "certain"), [(0.001, 3.0, True), (0.02, 3.0, False), (0.001, 1.9, False)])

@@ -305,12 +305,15 @@ def test_of_two_effects_of_which_one_contains_the_other_the_longer_one_is_fitted
     assert [a.effect.name for a in fit.model.effects] == ["inertia-lag"]
 
 
-def test_friction_that_does_nothing_goes_back_to_the_inertia_of_turns():
-    table = measured(hidden(inertia_lag={"tau_s": 0.25, "turn_ratio": 0.3}), trials=12, seed=11, speeds=(-0.2, 0.2))
+@pytest.mark.parametrize("friction", ["gear-friction", "scrub-friction"])
+def test_friction_that_does_nothing_goes_back_to_the_inertia_of_turns(friction):
+    table = measured(hidden(inertia_lag={"tau_s": 0.25, "turn_ratio": 0.3}), trials=20, seed=11, speeds=(-0.2, 0.2))
     predictor = WheelPredictor(tracks_of(table))
-    problem, fit, _ = fit_set(predictor, NOMINAL, [effect_named("gear-friction")])
+    problem, fit, _ = fit_set(predictor, NOMINAL, [effect_named(friction)])
     search = StepwiseSelection(predictor, NOMINAL)
-    _, fit, accepted = search._look_back.backward_step(problem, fit, ("gear-friction",))
+    beside = search._look_back._shortened(problem, fit, ("wheelbase", friction, "dead-zone"))[2]
+    assert beside == ("wheelbase", "inertia-lag", "dead-zone")
+    _, fit, accepted = search._look_back.backward_step(problem, fit, (friction,))
     assert accepted == ("inertia-lag",)
     assert fit.model.values_of("inertia-lag") == pytest.approx({"tau_s": 0.25, "turn_ratio": 0.3}, rel=0.1)
 
@@ -324,6 +327,17 @@ def test_friction_in_the_gears_is_told_from_a_lag_and_a_dead_zone_also_where_a_l
         assert found.accepted == ("gear-friction",)
         assert [a.effect.name for a in found.fit.model.effects] == ["gear-friction"]
         assert found.fit.model.values_of("gear-friction") == pytest.approx(friction, rel=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tau_s", [0.15, 0.02])
+def test_friction_against_turns_is_one_effect_beside_a_lag(tau_s):
+    """A short lag looks like a late clock at first, which then gives way together with the turn rate that is lost."""
+    friction = {"tau_s": tau_s, "turn_ratio": 0.7, "width_rad_s": 0.4}
+    table = measured(hidden(scrub_friction=friction), trials=30, seed=12, speeds=(-0.2, 0.2))
+    found = StepwiseSelection(WheelPredictor(tracks_of(table)), NOMINAL).run()
+    assert found.accepted == ("scrub-friction",)
+    assert found.fit.model.values_of("scrub-friction") == pytest.approx(friction, rel=0.15)
 
 
 @pytest.mark.slow
