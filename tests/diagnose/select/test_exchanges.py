@@ -395,10 +395,10 @@ def test_one_effect_in_the_place_of_two_begins_from_their_numbers():
     model = NOMINAL.with_effect("motor-lag", tau_s=0.1)
     model = model.with_active(effect_named("inertia-lag"), (0.02, 0.7)).with_effect("turn-dead-zone", width_rad_s=0.4)
     fit, problem = SimpleNamespace(model=model), SimpleNamespace(fit=lambda one: one)
-    pair = ("turn-dead-zone", "inertia-lag")
-    begun = look_back._from_their_numbers(problem, fit, pair, effect_named("scrub-friction"))
-    assert [a.effect.name for a in begun.effects] == ["scrub-friction"]
-    assert begun.values_of("scrub-friction") == {"tau_s": 0.02, "turn_ratio": 0.7, "width_rad_s": 0.4}
+    for pair in (("inertia-lag", "turn-dead-zone"), ("turn-dead-zone", "inertia-lag")):
+        begun = look_back._from_their_numbers(problem, fit, pair, effect_named("scrub-friction"))
+        assert [a.effect.name for a in begun.effects] == ["scrub-friction"]
+        assert begun.values_of("scrub-friction") == {"tau_s": 0.02, "turn_ratio": 0.7, "width_rad_s": 0.4}
     begun = look_back._from_their_numbers(problem, fit, pair, effect_named("lag-mismatch"))
     assert begun.values_of("lag-mismatch") == {"tau_s": 0.02, "ratio": 1.0}
     assert look_back._from_their_numbers(problem, fit, pair, effect_named("speed-gain")) is None
