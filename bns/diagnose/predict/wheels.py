@@ -41,7 +41,6 @@ _STATEFUL = (
 )
 """Effects behind a delay of commands to which it makes no difference whether the delay is before or behind them."""
 
-_PLAIN = Model(1.0)
 Chain = tuple[tuple[Effect, tuple[float, ...], tuple[float, ...]], ...]
 """Effects that act, their values, and those of each trial."""
 
@@ -285,7 +284,7 @@ def _model_of(wheelbase_m: float, chain: Chain) -> Model:
     effects = tuple(
         ActiveEffect(e, values, per_trial=bool(trial_values), trial_values=trial_values) for e, values, trial_values in chain
     )
-    return _PLAIN.derived(wheelbase_m=wheelbase_m, effects=effects)
+    return Model(wheelbase_m).derived(effects=effects)
 
 
 def predictor_for_search(tracks: Tracks) -> WheelPredictor:
