@@ -66,12 +66,13 @@ def test_a_term_with_which_an_error_rises_must_not_be_added(rose, medians, fell,
 
 
 def test_an_effect_that_no_robot_has_with_such_numbers_is_told_unless_it_is_a_simpler_one():
-    (parameter,) = effect_named("turn-dead-zone").parameters
+    scrub = effect_named("scrub-friction")
 
     def tried(value, gain, why):
-        fit = SimpleNamespace(free=(FreeParameter("turn-dead-zone", parameter),), values=[value])
+        model = SimpleNamespace(effects=[SimpleNamespace(effect=scrub)])
+        fit = SimpleNamespace(free=(FreeParameter("scrub-friction", scrub.parameters[2]),), values=[value], model=model)
         earned = SimpleNamespace(elpd_diff=gain)
-        return SimpleNamespace(name="turn-dead-zone", fit=fit, rejected_because=why, paired_comparison=earned)
+        return SimpleNamespace(name="scrub-friction", fit=fit, rejected_because=why, paired_comparison=earned)
 
     def said(one, accepted=()):
         nominal = SimpleNamespace(losses=np.full(20, 100.0))
@@ -79,7 +80,7 @@ def test_an_effect_that_no_robot_has_with_such_numbers_is_told_unless_it_is_a_si
         return list(_on_odd_numbers(SimpleNamespace(steps=[step], nominal=nominal, accepted=accepted)))
 
     (note,) = said(tried(5.0, 50.0, "width_rad_s is at its bound, 5 rad/s"))
-    assert note.startswith("turn-dead-zone would lower the error, but is no explanation: fitted, width_rad_s is at its bound")
+    assert note.startswith("scrub-friction would lower the error, but is no explanation: fitted, width_rad_s is at its bound")
     assert not said(tried(0.0, 50.0, "width_rad_s is at its bound, 0 rad/s"))
     assert not said(tried(5.0, 50.0, ""))
     assert not said(tried(5.0, 1e-3, "width_rad_s is at its bound, 5 rad/s"))

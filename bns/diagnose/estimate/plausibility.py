@@ -28,7 +28,9 @@ def at_bound(fit: Fit, name: str) -> bool:
 
 
 def does_no_more(fit: Fit, name: str) -> bool:
-    """Whether a number of an effect ended at a bound that is its neutral value: the effect does no more than a simpler one."""
+    """Whether an effect that extends another ended with a number at a bound that is neutral: it does no more than that other."""
+    if not any(active.effect.name == name and active.effect.extends for active in fit.model.effects):
+        return False
     pairs = zip(fit.free, fit.values, strict=True)
     return any(n.effect == name and _stopped(n.parameter, float(v)) and float(v) == n.parameter.neutral for n, v in pairs)
 

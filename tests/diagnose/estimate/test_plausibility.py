@@ -48,13 +48,19 @@ def test_a_number_at_its_bound_is_implausible_where_bounds_count():
     assert implausible(fit, "another") == ""
 
 
-def test_an_effect_with_a_number_at_a_bound_where_it_is_neutral_does_no_more_than_a_simpler_one():
+def test_an_effect_with_a_number_at_a_bound_where_it_is_neutral_does_no_more_than_what_it_extends():
     width = Parameter("width", "m/s", 0.0, 1.0, (0.0, 0.1), 0.0, "")
-    assert does_no_more(fit_of(0.0, 0.0, 0.1, parameter=width), "e")
-    assert not does_no_more(fit_of(0.0, 0.0, 0.1, parameter=width), "another")
-    assert not does_no_more(fit_of(1.0, 0.0, 1.0, parameter=width), "e")  # at its other bound it does something
-    assert not does_no_more(fit_of(1.0, 0.9, 1.1), "e")  # neutral, and at no bound
-    assert not does_no_more(fit_of(0.0, 0.0, 0.1, parameter=replace(width, reached=(0.0,))), "e")
+
+    def no_more(value, extends="lag", parameter=width, asked="e"):
+        model = SimpleNamespace(effects=[SimpleNamespace(effect=SimpleNamespace(name="e", extends=extends))])
+        return does_no_more(fit_of(value, 0.0, 0.1, model, parameter=parameter), asked)
+
+    assert no_more(0.0)
+    assert not no_more(0.0, asked="another")
+    assert not no_more(0.0, extends="")  # alone it would do nothing there, and lower no error
+    assert not no_more(1.0)  # at its other bound it does something
+    assert not no_more(1.0, parameter=GAIN)  # neutral, and at no bound
+    assert not no_more(0.0, parameter=replace(width, reached=(0.0,)))
 
 
 @pytest.mark.parametrize(
