@@ -185,7 +185,7 @@ class Effect:
                 raise ModelError(f"effect {self.name}: {unknown_name(kind, given, valid)}")
 
     def __hash__(self) -> int:
-        """By its name: the hash of all that an effect says took a fiftieth of a diagnosis."""
+        """By its name alone: effects are keys of caches that a search asks thousands of times."""
         return hash(self.name)
 
     def scaled(self, wheelbase_m: float) -> Effect:
