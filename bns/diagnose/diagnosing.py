@@ -196,7 +196,7 @@ def _hint(
     if unexplained or selection.accepted or trials >= FEW_TRIALS:
         return None
     step, least = selection.steps[0], MIN_GAIN * float(selection.nominal.losses.mean())
-    level = _HINT * FALSE_ALARM / max(step.of, len(step.ranking), 1)
+    level = _HINT * FALSE_ALARM / step.candidates
     near = [
         c
         for c in step.ranking

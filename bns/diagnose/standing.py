@@ -67,7 +67,7 @@ def least_certain(selection: SelectionResult) -> str:
     if selection.problem.predictor.luck is None or step is None:
         return ""
     freedom = max(len(fit.losses) - len(fit.free), 1)
-    level = FALSE_ALARM / max(step.of, len(step.ranking), 1)
+    level = FALSE_ALARM / step.candidates
     needed = float(stdtrit(freedom, 1.0 - level / 2.0) / stdtrit(freedom, 0.975))
     farthest: dict[str, float] = {}
     for name in selection.accepted:

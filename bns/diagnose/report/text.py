@@ -266,11 +266,12 @@ def _ranking(d: Diagnosis) -> Iterator[str]:
     yield "\neach effect added alone: gain on held-out trials (log-likelihood per trial):"
     yield f"  {'effect':20}{'gain':>10}{'± se':>10}{'p':>10}"
     ranking = d.selection.steps[0].ranking
-    for c in [*ranking[:_SHOWN], *(c for c in ranking[_SHOWN:] if c.name in d.effects)]:
+    shown = [*ranking[:_SHOWN], *(c for c in ranking[_SHOWN:] if c.name in d.effects)]
+    for c in shown:
         rejected = f"not considered: {c.rejected_because}" if c.rejected_because else ""
         e = c.paired_comparison
         yield f"  {c.name:20}{e.elpd_diff:10.3f}{e.dse:10.3f}{e.p_value:10.2g}  {rejected}".rstrip()
-    if any(c.rejected_because for c in ranking[:_SHOWN]):
+    if any(c.rejected_because for c in shown):
         yield "  (not considered: alone, it fits only with a number that no robot has, or that these data leave open)"
     ranked = [c.name for c in ranking]
     later = [name for name in d.effects if name not in ranked]

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.plausibility import at_bound, implausible, undetermined
+from bns.diagnose.estimate.significance import PairedComparison
 from bns.diagnose.select.extending import extended, fits_better, reduced, variant
 from bns.diagnose.select.negligible import certainly_better
 from bns.diagnose.select.result import Candidate
@@ -40,11 +41,13 @@ class Acceptance:
         """Whether what a candidate gains over the fit before is certain, enough, and more than a decoy gains."""
         e = candidate.paired_comparison
         least = MIN_GAIN * float(before.held_out.mean())
-        return e.p_value < self._level and e.z > self._least_z and e.elpd_diff > max(decoy_threshold, least)
+        return self._sure(e) and e.elpd_diff > max(decoy_threshold, least)
 
     def certain(self, problem: Problem, before: Fit, after: Fit) -> bool:
         """Whether the gain on held-out trials from one fit to another is certain, however small it is."""
-        gain = problem.paired_comparison(before, after)
+        return self._sure(problem.paired_comparison(before, after))
+
+    def _sure(self, gain: PairedComparison) -> bool:
         return gain.p_value < self._level and gain.z > self._least_z
 
     def earned_over(self, problem: Problem, lacking: Fit, fit: Fit, name: str) -> bool:

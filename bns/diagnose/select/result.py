@@ -44,6 +44,11 @@ class SelectionStep:
     instead_of: str = ""
     """The accepted effect whose place the selected one took, if that extends another."""
 
+    @property
+    def candidates(self) -> int:
+        """Among how many effects the round chose; at least 1."""
+        return max(self.of, len(self.ranking), 1)
+
     def slim(self) -> SelectionStep:
         """Without the innovations and Jacobians of what was tried."""
         return replace(self, ranking=tuple(candidate.slim() for candidate in self.ranking))

@@ -18,6 +18,7 @@ from bns.physics.wheels.friction import braked_together
 from bns.physics.wheels.scans import first_order
 
 _NOTABLE_LOSS = 0.05
+"""Of the friction, as a fraction: a smaller loss is not said. Chosen by hand."""
 
 
 def apply(wheels: Wheels, tau_s: float, turn_ratio: float, friction_m_s: float, loss_m_s: float) -> Wheels:

@@ -24,5 +24,13 @@ def test_what_the_verdict_names_is_in_the_table_however_little_it_gains_alone(ef
     assert named == [f"e{i}" for i in range(_SHOWN)] + more
 
 
+def test_a_rejection_in_the_table_is_explained_below_it():
+    def is_explained(effects):
+        return any("(not considered: alone, it fits only with a number" in line for line in lines(effects))
+
+    assert is_explained((f"e{_SHOWN + 1}",))
+    assert not is_explained(())
+
+
 def test_what_was_found_later_is_said_below():
     assert any("(not tried alone, but found later in the search: f)" in line for line in lines(("e1", "f")))
