@@ -160,4 +160,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__} - {"TYPE_CHECKING", "Any", "ModuleType", "annotations", "importlib", "sys"})
+    private = {name for name in globals() if name.startswith("_") and not name.startswith("__")}
+    return sorted({*globals(), *__all__} - private - {"TYPE_CHECKING", "Any", "ModuleType", "annotations", "importlib", "sys"})

@@ -81,6 +81,7 @@ def test_importing_loads_nothing_else():
 def test_every_name_is_listed_there_and_documented():
     assert set(bns.__all__) <= set(dir(bns))
     assert not {"importlib", "sys"} & set(dir(bns))
+    assert [name for name in dir(bns) if name.startswith("_") and not name.endswith("__")] == []
     for name in bns.__all__:
         thing = getattr(bns, name)
         assert name == "__version__" or len(thing.__doc__) > 20, name

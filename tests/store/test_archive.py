@@ -109,12 +109,15 @@ def test_what_is_no_archive_is_refused_in_words(results, tmp_path):
     changed[len(changed) // 3] ^= 1
     (tmp_path / "changed.parquet").write_bytes(changed)
     (tmp_path / "text.parquet").write_text("not a table")
+    (tmp_path / "text.csv").write_text("a,b\n1,2\n")
     part = next((results / "journal").glob("*"), None)
     assert part is not None
     with pytest.raises(StoreError, match="is not as it was written"):
         connect_archives([tmp_path / "changed.parquet"])
     with pytest.raises(StoreError, match=r"is no archive\. Make one from the results: bns archive results -o text\.parquet"):
         connect_archives([tmp_path / "text.parquet"])
+    with pytest.raises(StoreError, match=r"text\.csv is no archive\. .*: bns archive results -o text\.parquet"):
+        connect_archives([tmp_path / "text.csv"])
 
 
 def test_the_command_writes_the_file_or_says_why_not(results, tmp_path, capsys):

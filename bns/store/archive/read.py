@@ -64,7 +64,7 @@ def described(path: Path) -> dict[str, Any]:
         said = {}
     if said.get("archive") != FORMAT:
         why = f"has format {said['archive']}, and this bns reads {FORMAT}" if "archive" in said else "is no archive"
-        raise StoreError(f"{path} {why}. Make one from the results: bns archive results -o {path.name}")
+        raise StoreError(f"{path} {why}. Make one from the results: bns archive results -o {path.with_suffix('.parquet').name}")
     return dict(said)
 
 
