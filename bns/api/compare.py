@@ -20,6 +20,8 @@ from bns.api.model import Given, Model
 from bns.diagnose.adding import fitted_to, model_yaml
 from bns.diagnose.comparison import Comparison
 from bns.diagnose.comparison import compare as held_against
+from bns.diagnose.predict.base import Predictor
+from bns.diagnose.predict.jointed import JointedPredictor
 from bns.diagnose.predict.networks import NetworkPredictor
 from bns.diagnose.report.network_text import network_errors_text
 from bns.diagnose.report.text import ahead, comparison_text
@@ -160,7 +162,7 @@ def compare(
     def work() -> Comparison:
         return held_against(ready.predictor, ready.model, tick=meter, beside=named)
 
-    also = [[name, one.canonical_json(), model_yaml(one)] for name, one in named]
+    also = [[name, one.canonical_json(), model_yaml(one)] for name, one, _ in named]
     result = remembered("compare", ready, also, work, Comparison, fresh) if isinstance(ready, Prepared) else work()
     kept = isinstance(ready.predictor, NetworkPredictor) and ready.predictor.learned_from.size > 0
     causes = why_wrong(cast("NetworkPredictor", ready.predictor)) if kept else None
@@ -175,25 +177,38 @@ def _several(beside: Given | Sequence[Given]) -> tuple[Given, ...]:
     return tuple(beside) if isinstance(beside, list | tuple) else (cast("Given", beside),)
 
 
-def _named(ready: Prepared | PreparedNetworks, others: Sequence[Given]) -> list[tuple[str, Model]]:
-    """Further models, each checked as the first, under names of their own."""
-    named: list[tuple[str, Model]] = []
+def _named(ready: Prepared | PreparedNetworks, others: Sequence[Given]) -> list[tuple[str, Model, Predictor | None]]:
+    """Further models, each checked as the first, under names of their own, and what foresees those of another body."""
+    named: list[tuple[str, Model, Predictor | None]] = []
     taken = {ready.model.name}
     for number, given in enumerate(others, start=2):
         if isinstance(given, physics.Model | str | PathLike) and are_networks(given):
             raise ModelError(f"{given} holds networks; only models with effects are compared beside others.")
-        one = prepared(ready.log, given).model
-        name = one.name if one.name not in taken else f"{one.name} ({number})"
+        one = prepared(ready.log, given)
+        name = one.model.name if one.model.name not in taken else f"{one.model.name} ({number})"
         taken.add(name)
-        named.append((name, one))
+        named.append((name, one.model, _of_its_own(ready.predictor, one)))
     return named
 
 
-def _fitted_here(ready: Prepared, named: Sequence[tuple[str, Model]]) -> tuple[str, ...]:
+def _of_its_own(first: Predictor, other: Prepared) -> Predictor | None:
+    """What foresees a model of another body, on the stretches that the first one counts; None for one of the same."""
+    own = other.predictor
+    if not isinstance(first, JointedPredictor) or not isinstance(own, JointedPredictor) or first.foresees(other.model):
+        return None
+    if own.sites != first.sites:
+        raise ModelError(
+            f"{other.model.name} is seen at the sites {', '.join(own.sites)}, and the model that it is compared beside at "
+            f"{', '.join(first.sites)}. Give both models the same sites in the same order."
+        )
+    return own.on_stretches_of(first)
+
+
+def _fitted_here(ready: Prepared, named: Sequence[tuple[str, Model, Predictor | None]]) -> tuple[str, ...]:
     """What to beware of: models that were fitted to these measurements know them."""
     of_others = [
         f"The model {name} was fitted to these very measurements ({ready.log.name}): its errors are lower than on new ones."
-        for name, one in named
+        for name, one, _ in named
         if fitted_to(one, ready.measured.digest)
     ]
     return tuple(note for note in (ready.fitted_here, *of_others) if note)

@@ -114,11 +114,12 @@ def compare(
     model: Model,
     seed: int = 0,
     tick: Callable[[str], None] = lambda _: None,
-    beside: Sequence[tuple[str, Model]] = (),
+    beside: Sequence[tuple[str, Model, Predictor | None]] = (),
 ) -> Comparison:
     """Hold a model as it is against tracks. ``seed`` draws the bootstrap of the bands; ``tick`` is told what is being done.
 
-    ``beside``: further models under their names, as they are, whose errors are paired with this one's.
+    ``beside``: further models under their names, as they are, whose errors are paired with this one's; each with a predictor of its
+    own where it is of another body, over the same frames, or None.
     """
     tracks = predictor.tracks
     if not (np.diff(tracks.first) > 1).any():
@@ -132,7 +133,7 @@ def compare(
     steps = steps_of(predictor, problem.pose_filter, fit.model)
     windows = PairedWindows(predictor)
     judged = windows.errors([(model.name, steps)])
-    others = [(name, _predicted(predictor, other)) for name, other in beside]
+    others = [(name, _predicted(own or predictor, other)) for name, other, own in beside]
     errors = {h: judged_windows(predictor, steps, h) for h in predictor.horizons}
     tick("what explains them")
     dependence = residual_dependence(problem, fit)

@@ -8,6 +8,7 @@ import pytest
 
 import bns
 from bns.cli.main import main
+from bns.errors import ModelError
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
 ROBOT = hidden(motor_lag={"tau_s": 0.12})
@@ -104,3 +105,43 @@ def test_the_command_says_the_same(log, extended, tmp_path, capsys):
     told = {horizon: [e["models"][1]["position_rms_m"], e["changes"][0]["change_m"]] for horizon, e in first.items()}
     assert told == {horizon: [row.position_m, row.change_m] for (_, horizon), row in found.changes.iterrows()}
     assert second["1s"]["changes"][0]["change_m"] == 0  # the wheelbase is that of both
+
+
+@pytest.mark.parametrize("alike", [True, False])
+def test_another_body_is_simulated_as_itself(tmp_path, monkeypatch, alike):
+    """On the stretches that the first one counts, where the two differ in those that can be foreseen, too."""
+    from bns.diagnose.predict import jointed  # noqa: PLC0415  # MuJoCo is slow to load
+    from tests.jointed.arm import log as moved_arm  # noqa: PLC0415
+    from tests.jointed.arm import xml  # noqa: PLC0415
+
+    for name, stiffness in (("arm", 6.0), ("soft", 3.0)):
+        (tmp_path / f"{name}.xml").write_text(xml(stiffness))
+    arm, soft, data = bns.Model(tmp_path / "arm.xml"), bns.Model(tmp_path / "soft.xml"), moved_arm(3)
+    alone, other = bns.compare(data, arm, fresh=True), bns.compare(data, soft, fresh=True)
+    if not alike:
+        far = jointed._far_m
+        counts = iter([1, 5])  # stretches at the end that are wild: of the first body, of the other one
+
+        def some_wild(simulations, bare):
+            found = far(simulations, bare)
+            wild = next(counts, 0)
+            return np.where(np.arange(len(found)) < len(found) - wild, found, 9.0)
+
+        monkeypatch.setattr(jointed, "_far_m", some_wild)
+    both = bns.compare(data, arm, beside=soft, fresh=True)
+    there = int(alone.errors.loc["stretch", "windows"])
+    assert both.errors.loc["stretch", "windows"] == (there if alike else there - 1)
+    row = both.changes.iloc[0]
+    if alike:
+        assert row.position_m == pytest.approx(other.errors.loc["stretch", "position_m"], rel=1e-12)
+    assert row.position_m > 1.2 * both.errors.loc["stretch", "position_m"]
+
+
+def test_another_body_is_seen_at_the_same_sites(tmp_path):
+    from tests.jointed.arm import log as moved_arm  # noqa: PLC0415
+    from tests.jointed.arm import xml  # noqa: PLC0415
+
+    (tmp_path / "arm.xml").write_text(xml())
+    (tmp_path / "half.xml").write_text(xml().replace('<site name="elbow" pos="0 0 0"/>', ""))
+    with pytest.raises(ModelError, match=r"half is seen at the sites hand, .* at elbow, hand\. Give both models the same sites"):
+        bns.compare(moved_arm(3), bns.Model(tmp_path / "arm.xml"), beside=bns.Model(tmp_path / "half.xml"))

@@ -74,14 +74,16 @@ class ReversalPause(Cause):
 
 @dataclass
 class Breakaway(Cause):
-    """Each wheel has a switch, moved by its commands in turn: on from one, off below a lower one."""
+    """Each wheel has two switches, one for each direction, moved by its commands in turn: on from one, off below a lower one."""
 
     threshold_m_s: float
     stop_ratio: float
 
     def command(self, wheels: np.ndarray) -> np.ndarray:
-        size = np.abs(wheels)
-        said = np.where(size >= self.threshold_m_s, 1, np.where(size < self.threshold_m_s * self.stop_ratio, -1, 0))
+        return self._one_way(wheels) - self._one_way(-wheels)
+
+    def _one_way(self, wheels: np.ndarray) -> np.ndarray:
+        said = np.where(wheels >= self.threshold_m_s, 1, np.where(wheels < self.threshold_m_s * self.stop_ratio, -1, 0))
         state, out = np.full_like(said[:, 0], -1), np.zeros_like(wheels)
         for i in range(wheels.shape[1]):
             state = np.where(said[:, i] != 0, said[:, i], state)

@@ -89,14 +89,29 @@ class JointedPredictor:
         wild = far_m > _WILD_M
         self.left_out = int(wild.sum())
         """Stretches that nobody can foresee: a little luck moves the robot far."""
-        if wild.any() and not wild.all():
-            kept = np.flatnonzero(~wild)
-            simulations, far_m = simulations.only(kept), far_m[kept]
+        self._all, self._kept = simulations, np.flatnonzero(~wild) if not wild.all() else np.arange(len(wild))
+        if len(self._kept) < len(wild):
+            simulations, far_m = simulations.only(self._kept), far_m[self._kept]
         self._exactly = simulations.exactly(bare)
         self._setup(simulations, bare)
         chance = _Chance(self._luck(), far_m)
         self._foresee(chance)
         self.screening: Predictor | None = self._light(chance, _LIGHT)
+
+    def on_stretches_of(self, other: JointedPredictor) -> JointedPredictor:
+        """This body on the stretches that another one of the same measurements counts, which may differ in what can be foreseen."""
+        if np.array_equal(self._kept, other._kept):
+            return self
+        new = object.__new__(JointedPredictor)
+        new.near, new.horizons, new._tracking_m = self.near, self.horizons, self._tracking_m
+        new.left_out, new.not_taken = other.left_out, other.not_taken
+        new._all, new._kept = self._all, other._kept
+        simulations = self._all.only(other._kept)
+        new._exactly = simulations.exactly(self._bare)
+        new._setup(simulations, self._bare)
+        new._foresee(_Chance(new._luck(), _far_m(simulations, self._bare)))
+        new.screening = None
+        return new
 
     def _light(self, chance: _Chance, cycles: Sequence[int]) -> JointedPredictor:
         """The same for so many of the stretches, which in turn has the next fewer of its own for a first look."""
@@ -144,6 +159,15 @@ class JointedPredictor:
     def anchor(self, model: Model, alone: bool = False) -> bool:
         """Simulate this model itself: later answers nearby start from it."""
         return self._responses.anchor(model, alone)
+
+    def foresees(self, model: Model) -> bool:
+        """Is it a model of this body, whatever its effects?"""
+        return isinstance(model, JointedModel) and model.mechanism == self._bare.mechanism
+
+    @property
+    def sites(self) -> tuple[str, ...]:
+        """Names of the tracked sites."""
+        return self._bare.mechanism.sites
 
     def steps(self, model: Model) -> Steps:
         """What the body does from frame to frame, and how far the distances of its points are off."""

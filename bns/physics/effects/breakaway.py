@@ -1,6 +1,6 @@
 """A wheel at rest starts only above one command, and one that turns stops only below a lower one: friction at rest is higher.
 
-A wheel whose command jumps to the other direction is not held: it does not rest in between. With both thresholds alike:
+A wheel that is told to reverse passes through rest, however suddenly, and must break away again. With both thresholds alike:
 `dead-band`.
 """
 
@@ -22,7 +22,10 @@ _NEAR = np.linspace(0.92, 1.08, 17)
 
 
 def apply(wheels: Wheels, threshold_m_s: float, stop_ratio: float) -> Wheels:
-    """A wheel stands from a command below ``stop_ratio``·``threshold_m_s`` to one of ``threshold_m_s``, and at the beginning."""
+    """A wheel stands from a command below ``stop_ratio``·``threshold_m_s``, or of the other direction, to one of ``threshold_m_s``.
+
+    It stands at the beginning, too.
+    """
     stop = stop_ratio * threshold_m_s
     return wheels.turning(
         broken_away(wheels.left_m_s, wheels.step_s, threshold_m_s, stop),
@@ -39,8 +42,8 @@ def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
         return ()
     told, saw = np.stack([wheels.left_m_s, wheels.right_m_s]), seen_speeds(wheels)
     gain = np.nan_to_num(told * (2.0 * saw - told)) * wheels.step_s
-    told, gain = (values.reshape(-1, told.shape[-1]) for values in (np.abs(told), gain))
-    fastest = float(np.quantile(told[told > 0], 0.99)) if (told > 0).any() else 0.0
+    told, gain = (values.reshape(-1, told.shape[-1]) for values in (told, gain))
+    fastest = float(np.quantile(np.abs(told[told != 0]), 0.99)) if told.any() else 0.0
     if fastest == 0.0 or not gain.any():
         return ()
     thresholds = fastest * np.geomspace(_SLOW, _FAST, _MANY)
@@ -88,7 +91,7 @@ EFFECT = Effect(
             reached=(0.0, 1.0),
         ),
     ),
-    equation="w = u from |u| >= t on until |u| < r·t, else 0, for each wheel",
+    equation="w = u from |u| >= t on until |u| < r·t or u changes sign, else 0, for each wheel",
     residuals="The same slow command is driven after a fast one and not after a stop.",
     lookalikes=("dead-band", "stribeck", "backlash"),
     sentence="a wheel at rest starts only at a higher command than the one at which a turning wheel stops",
@@ -98,4 +101,5 @@ EFFECT = Effect(
     needs="track",
     extends="dead-band",
     starts_from=starts_from,
+    revision=2,
 )

@@ -29,30 +29,36 @@ def paused(target: Array, step_s: Array, pause_s: float) -> Array:
 
 @exact
 def broken_away(target: Array, step_s: Array, start: float, stop: float) -> Array:
-    """The target from ``start`` on until it is below ``stop``, in size, else 0; a trial begins at rest."""
+    """The target from ``start`` on until it is below ``stop``, in size, or of the other direction, else 0; at rest at first."""
     out = np.zeros_like(target)
     for row in range(target.shape[0]):
-        turns = False
+        direction = 0.0
         for k in range(target.shape[1]):
+            u = target[row, k]
             if step_s[row, k] == 0.0:
                 continue
-            turns = abs(target[row, k]) >= (stop if turns else start)
-            if turns:
-                out[row, k] = target[row, k]
+            if abs(u) >= start or (u * direction > 0.0 and abs(u) >= stop):
+                direction, out[row, k] = np.sign(u), u
+            else:
+                direction = 0.0
     return out
 
 
 @exact
-def summed_while_on(size: Array, values: Array, starts: Array, stops: Array) -> Array:
-    """Of each pair of start and stop, (pairs,): the sum of ``values`` where `broken_away` is not 0; ``size`` is |target|."""
+def summed_while_on(target: Array, values: Array, starts: Array, stops: Array) -> Array:
+    """Of each pair of start and stop, (pairs,): the sum of ``values`` where `broken_away` is not 0."""
     out = np.zeros(len(starts))
     for pair in range(len(starts)):
-        for row in range(size.shape[0]):
-            turns = False
-            for k in range(size.shape[1]):
-                turns = size[row, k] >= (stops[pair] if turns else starts[pair])
-                if turns:
+        start, stop = starts[pair], stops[pair]
+        for row in range(target.shape[0]):
+            direction = 0.0
+            for k in range(target.shape[1]):
+                u = target[row, k]
+                if abs(u) >= start or (u * direction > 0.0 and abs(u) >= stop):
+                    direction = np.sign(u)
                     out[pair] += values[row, k]
+                else:
+                    direction = 0.0
     return out
 
 

@@ -102,7 +102,8 @@ def test_commands_of_a_joystick_that_are_cut_off_are_no_friction_and_steps():
 
 def test_a_wheel_that_starts_late_is_found_from_one_that_stops_at_the_same_command():
     """The best single threshold, by which it is begun, lies far from both."""
-    predictor = driven(breakaway={"threshold_m_s": 0.09, "stop_ratio": 0.4})
+    hides = hidden(breakaway={"threshold_m_s": 0.09, "stop_ratio": 0.4})
+    predictor = WheelPredictor(tracks_of(measured(hides, trials=20, seed=4, speeds=(0.0, 0.2), jitter=0.0)))
     effects = listed(NOMINAL, None, predictor.tracks)
     problem = problem_for(predictor, NOMINAL)
     alike = fit_with(problem, problem.fit(NOMINAL), effects["dead-band"])
