@@ -48,6 +48,7 @@ VARIABLES: Mapping[str, str] = {
     "x": "position east, m",
     "y": "position north, m",
     "heading": "heading, rad",
+    "turned": "turn since the trial began, rad, left positive; whole turns count",
     "moving": "1 while a wheel turns, else 0; with wheels that lag it comes and goes as late",
     "swing": "how far the present direction of motion differs from that over the last half wheelbase of distance: 0 the same, "
     "1 the opposite",
@@ -71,7 +72,7 @@ RECENT_S = 0.15
 NEVER_M = 1e3
 LARGEST = 1e9
 """Of a number in a term. At 1 mm/s a speed that is halved by a term in v**3 has a number of 5e5, in v**4 of 5e8."""
-_PLACE = {"x", "y", "heading"}
+_PLACE = {"x", "y", "heading", "turned"}
 _NUMBER = re.compile(r"[A-Za-z]\d*|k_\w+")
 
 
@@ -238,7 +239,7 @@ def _values(body: Body, code: Compiled) -> dict[str, Any]:
     }
     if body.place is not None:
         x, y, heading = np.moveaxis(body.place, -1, 0)
-        made |= {"x": lambda: x, "y": lambda: y, "heading": lambda: heading}
+        made |= {"x": lambda: x, "y": lambda: y, "heading": lambda: heading, "turned": lambda: heading - heading[:, :1]}
     return {name: make() for name, make in made.items() if name in code.names}
 
 

@@ -301,8 +301,9 @@ def _jumps(pose: np.ndarray, t: np.ndarray) -> np.ndarray:
     # there and back: a pose that is held and then catches up is no jump
     across = np.hypot(*(pose[2:, :2] - pose[:-2, :2]).T)
     returns = np.concatenate([[True], across < np.maximum(size[1:-1, 0], limits[0] / 2), [True]])
-    around = np.concatenate([[0.0], excess, [0.0]])
-    found: np.ndarray = near & returns & (excess > 1) & (excess >= around[:-2]) & (excess >= around[2:])
+    may = near & returns & (excess > 1)
+    around = np.concatenate([[0.0], np.where(may, excess, 0.0), [0.0]])  # beside a jump at an end, a sound pose looks as far off
+    found: np.ndarray = may & (excess >= around[:-2]) & (excess >= around[2:])
     return found
 
 

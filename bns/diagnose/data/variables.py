@@ -21,6 +21,7 @@ LABELS = {
     "x_m": "position x (m)",
     "y_m": "position y (m)",
     "heading_rad": "heading (rad)",
+    "turned_rad": "turn since the trial began (rad)",
     "place": "place",
     "a_lat_rad": "lateral amplitude (rad)",
     "a_vert_rad": "vertical amplitude (rad)",

@@ -44,6 +44,8 @@ _STATEFUL = (
 Chain = tuple[tuple[Effect, tuple[float, ...], tuple[float, ...]], ...]
 """Effects that act, their values, and those of each trial."""
 
+_OF_PLACE = frozenset({"x_m", "y_m", "heading_rad", "turned_rad"})
+
 
 class WheelPredictor:
     """Drives the commands of tracks once, and answers any model with the displacement between successive frames."""
@@ -195,7 +197,7 @@ class WheelPredictor:
                 "speed_m_s": speed,
                 "wheel_difference_m_s": turn,
                 "session_s": tracks.start_s[:, None] + middle,
-                **{name: self._seen_on_grid(name) for name in self._seen() if name not in {"x_m", "y_m", "heading_rad"}},
+                **{name: self._seen_on_grid(name) for name in self._seen() if name not in _OF_PLACE},
             }
         return {
             "left_m_s": grid.left_m_s,
@@ -237,8 +239,9 @@ class WheelPredictor:
         heading = np.concatenate(
             [np.unwrap(tracks.pose[a:b, 2]) for a, b in zip(tracks.first[:-1], tracks.first[1:], strict=True)]
         )
+        turned = heading - np.repeat(heading[tracks.first[:-1].clip(max=len(heading) - 1)], np.diff(tracks.first))
         extra = {k: v for k, v in tracks.extra.items() if np.isfinite(v).sum() > 1 and k != "session_s"}
-        return {"x_m": tracks.pose[:, 0], "y_m": tracks.pose[:, 1], "heading_rad": heading, **extra}
+        return {"x_m": tracks.pose[:, 0], "y_m": tracks.pose[:, 1], "heading_rad": heading, "turned_rad": turned, **extra}
 
     def _since_previous(self, values: Array) -> Array:
         change = np.diff(values, axis=0, prepend=values[:1])

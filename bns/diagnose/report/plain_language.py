@@ -13,6 +13,7 @@ from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.report.people import unit_for_people
 from bns.diagnose.report.sized import sized_sentence
+from bns.diagnose.residuals.drive_scatter import far_above_noise
 from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.result import SelectionResult
 from bns.diagnose.settings import DEFAULTS
@@ -20,6 +21,7 @@ from bns.diagnose.values import numbers_of, without_width
 
 _CAUSES = DEFAULTS.report.causes
 _LISTED = DEFAULTS.report.listed_causes
+ABOVE_NOISE = "The error is above tracking noise all the same: see the notes."
 _UNKNOWN = "something that none of the known effects explains"
 
 
@@ -70,8 +72,15 @@ def numbers_in_words(
     ]
 
 
+def nothing_above_noise(d: Diagnosis) -> bool:
+    """Was nothing found, and is the error far above tracking noise all the same?"""
+    return d.verdict == "none" and d.errors is not None and far_above_noise(d.errors)
+
+
 def headline(d: Diagnosis) -> str:
     """The verdict in a few sentences."""
+    if nothing_above_noise(d):
+        return f"Nothing is missing from the model that these measurements could show. {ABOVE_NOISE}"
     numbers = d.numbers
     said = _all_of(d, d.effects, numbers)
     if d.selection is not None and (d.verdict == "tie" or (d.verdict == "unlisted" and d.selection.competing_models)):

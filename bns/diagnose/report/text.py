@@ -17,7 +17,7 @@ from bns.diagnose.effect_caveats import implausible_text
 from bns.diagnose.estimate.calibration import wheel_sizes
 from bns.diagnose.estimate.plausibility import with_unit
 from bns.diagnose.predict.paired_errors import Change, PairedErrors
-from bns.diagnose.report.plain_language import further_notes
+from bns.diagnose.report.plain_language import ABOVE_NOISE, further_notes, nothing_above_noise
 from bns.diagnose.report.sized import sized_sentence
 from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.select.known_effects import known_effects
@@ -72,7 +72,8 @@ def _diagnosis(d: Diagnosis, rivals: Sequence[Rival], command: Mapping[str, str]
         yield f"Missing from the model: {_named(d)}, and something that no listed effect explains."
     else:
         them = "it" if len(d.effects) == 1 else "them"
-        yield _VERDICTS[d.verdict].format(effects=enumerated(d.effects) or "nothing listed", them=them)
+        said = _VERDICTS[d.verdict].format(effects=enumerated(d.effects) or "nothing listed", them=them)
+        yield f"{said} {ABOVE_NOISE}" if nothing_above_noise(d) else said
     odd = [implausible_text(d.selection, name) for name in d.selection.implausible] if d.selection is not None else []
     yield from odd
     if d.selection is not None:

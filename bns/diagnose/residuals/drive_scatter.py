@@ -38,28 +38,37 @@ def _longer(predictor: Predictor, noise: Array, errors: PairedErrors, horizon: s
     return float(np.sqrt(beyond)) / by_drive if beyond > 0 and by_drive > 0 else 1.0
 
 
+def _judged(errors: PairedErrors) -> list[str]:
+    return [horizon for horizon, at in errors.horizons.items() if at.windows]
+
+
+def far_above_noise(errors: PairedErrors) -> bool:
+    """Whether the error at the longest horizon is far above tracking noise."""
+    judged = [errors.horizons[horizon] for horizon in _judged(errors)]
+    return bool(judged and judged[-1].models[-1].rms_m > NOTABLE * judged[-1].noise_floor_m)
+
+
 def scatter_in_words(predictor: Predictor, noise: Array, errors: PairedErrors) -> list[str]:
     """A sentence where the error at the longest horizon is far above tracking noise: does the drive's scatter make it?
 
     Wheels whose speeds vary over parts of a second scatter little from pose to pose, and more over seconds: what the scatter
     makes is then read from the next shorter horizon. What differs from trial to trial grows faster than a walk at random does.
     """
-    judged = [horizon for horizon, at in errors.horizons.items() if at.windows]
-    if not judged:
+    if not far_above_noise(errors):
         return []
+    judged = _judged(errors)
     horizon = judged[-1]
     at = errors.horizons[horizon]
     error, floor = at.models[-1].rms_m, at.noise_floor_m
     by_drive = wandering_m(predictor, noise, horizon)
     explained = np.hypot(by_drive, floor) / error
-    if not error > NOTABLE * floor:
-        return []
     if explained >= 1.0 / EXPLAINS:
         return [
             f"The error over {IN_WORDS[horizon]} ({1e3 * error:.3g} mm) is far above tracking noise ({1e3 * floor:.3g} mm), and "
             "no listed effect and no curve finds a pattern in it. From pose to pose, the track scatters by more: a drive "
-            f"that scatters so would be {1e3 * by_drive:.3g} mm off. So these jumps take one another back: look for a tracker "
-            "that shifts its poses at times (a hidden marker, a seam between two cameras) rather than for wheels that slip."
+            f"that scatters so would be {1e3 * by_drive:.3g} mm off. So its jumps take one another back, or are rare: look for a "
+            "tracker whose errors last for some poses (a hidden marker, a seam between two cameras), or for something that "
+            "happens at moments, such as a wheel that sticks."
         ]
     if explained <= EXPLAINS:
         over = judged[-2] if len(judged) > 1 else horizon
@@ -67,9 +76,10 @@ def scatter_in_words(predictor: Predictor, noise: Array, errors: PairedErrors) -
         if 1.0 / EXPLAINS > np.hypot(longer, floor) / error > EXPLAINS:
             return [
                 f"The error over {IN_WORDS[horizon]} ({1e3 * error:.3g} mm) is above tracking noise ({1e3 * floor:.3g} mm) "
-                f"because the drive itself scatters: grown as a walk at random grows, the error over {IN_WORDS[over]} makes "
+                f"as if the drive itself scattered: grown as a walk at random grows, the error over {IN_WORDS[over]} makes "
                 f"{1e3 * longer:.3g} mm. From pose to pose it scatters less ({1e3 * by_drive:.3g} mm), as wheels do whose "
-                "speeds vary over parts of a second. No listed effect and no curve finds a pattern in it."
+                "speeds vary over parts of a second, or a robot that something slow pushes. No listed effect and no curve finds "
+                "a pattern in it. Drive the same commands several times: what they share, a model can predict."
             ]
         return [
             f"The error over {IN_WORDS[horizon]} ({1e3 * error:.3g} mm) is far above tracking noise ({1e3 * floor:.3g} mm), and "

@@ -52,6 +52,8 @@ PULL = "heading, in proportion to the speed"
 """A turn for each metre driven, whichever way: a magnet, or a nap that guides the wheels."""
 LOGGED, LOGGED_OFFSET = "the logged ", ", whatever the speed"
 """Signals that are a further column of the log, by its name; as a factor of a velocity, and as an addition to it."""
+TWIST = "turn since the trial began"
+"""What winds up as the robot turns and unwinds as it turns back: a cable that hangs on it."""
 STRAIGHT = "straight lines"
 """What happens only while both wheels are told the same, such as a heading that is held by a gyro."""
 SPEED_KNOTS = DEFAULTS.residuals.speed_knots
@@ -198,6 +200,7 @@ def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float)
     if float((seen["left_m_s"] + seen["right_m_s"]).min()) < 0.0:
         yield Family(TRAVEL, "v", ("v", *(f"abs(v) * {t}" for t in turns)))  # a carpet's nap, forwards and backwards
     yield Family("heading", "w", tuple(f"moving * {t}" for t in turns))
+    yield Family(TWIST, "w", ("moving * turned", "moving * turned * abs(turned)", "moving"))
     yield Family(PULL, "w", tuple(f"abs(v) * {t}" for t in turns))
     yield Family("heading", SHARE, turns)  # both wheels alike: a carpet's nap
     (x0, x1), (y0, y1) = (np.quantile(predictor.tracks.pose[:, i], [0.02, 0.98]) for i in (0, 1))

@@ -9,7 +9,10 @@ from bns.diagnose.predict.base import Predictor
 from bns.diagnose.residuals.grammar import PULL
 from bns.diagnose.residuals.phrases import POINTS, VELOCITIES, curve_of, seconds, slower
 from bns.diagnose.residuals.symbolic import Formula
+from bns.diagnose.settings import DEFAULTS
 from bns.physics.formula import LEFT, RIGHT, SHARE, value_of
+
+_ENDS = DEFAULTS.report.surface_ends
 
 
 def _along(term: Formula, name: str, grid: Array, what: str) -> str:
@@ -66,6 +69,20 @@ def velocity_by_heading(term: Formula, predictor: Predictor) -> str:
     at = [f"{size[i]:+.2g} {unit} at a heading of {np.degrees(grid[i]):.0f}°" for i in (change.argmax(), change.argmin())]
     speed = "" if term.on == "w" and term.signal != PULL else f" at {usual:.2g} m/s"
     return f"{VELOCITIES[term.on]}{speed} depends on heading: {at[0]}, {at[1]}"
+
+
+def turned_in_words(angle_rad: float) -> str:
+    """After which turn since a trial began."""
+    degrees = round(float(np.degrees(angle_rad)))
+    return f"after {abs(degrees)}° to the {'left' if degrees > 0 else 'right'}" if degrees else "before it turns"
+
+
+def twist(term: Formula, predictor: Predictor) -> str:
+    """How the turn rate changes with the turn since the trial began: at the least and the largest that are usual."""
+    ends = np.quantile(predictor.variables()["turned_rad"], _ENDS)
+    change = np.degrees(curve_of(term, "turned", ends, moving=1.0))
+    at = [f"{one:+.2g} °/s {turned_in_words(end)}" for one, end in zip(change, ends, strict=True)]
+    return f"{VELOCITIES[term.on]} changes with the turn since the trial began (to the left: +): {', '.join(at)}"
 
 
 def travel(term: Formula, _: Predictor) -> str:

@@ -47,6 +47,7 @@ _SHAPES = {
     "time_in_trial_s": ("tau", "exp(-tau)", "exp(-tau/3)", "exp(-tau/8)", "tau**2"),
     "session_s": ("t", "t**2"),
     "heading_rad": ("sin(heading)", "cos(heading)", "sin(2*heading)", "cos(2*heading)"),
+    "turned_rad": ("turned", "turned * abs(turned)"),
     "way_m": ("d", "exp(-d)", "d**2"),
     "place": ("x", "y", "x*y", "x**2", "y**2"),
 }

@@ -18,6 +18,7 @@ from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.grammar import SURFACE
 from bns.diagnose.residuals.phrases import VELOCITIES, seconds
+from bns.diagnose.residuals.places_in_words import turned_in_words
 from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.residuals.words import driven, in_words, variables_of
 from bns.diagnose.settings import DEFAULTS
@@ -42,7 +43,12 @@ _TOLD: Mapping[str, tuple[str, ...]] = dict.fromkeys((SHARE, WHEELS, LEFT, RIGHT
 """The velocities of the body that the sentence about all terms is on."""
 _SCALED = ("v", "w")
 """What is slower or faster, rather than to one side or the other."""
-_PLACED: Mapping[str, tuple[str, ...]] = {"x": ("x_m", "y_m"), "y": ("x_m", "y_m"), "heading": ("heading_rad",)}
+_PLACED: Mapping[str, tuple[str, ...]] = {
+    "x": ("x_m", "y_m"),
+    "y": ("x_m", "y_m"),
+    "heading": ("heading_rad",),
+    "turned": ("turned_rad",),
+}
 _TIMED: Mapping[str, tuple[str, ...]] = {"tau": ("time_in_trial_s",), "t": ("session_s",)}
 _SPEEDS = ("v", "w")
 _UNSAID = "; other terms take back a part of this, so that only the sum of all describes the robot"
@@ -273,6 +279,7 @@ _WHERE: Mapping[tuple[str, ...], Callable[..., str]] = {
     _SPEEDS: _at_speed,
     ("x_m", "y_m"): lambda x, y: f"near ({x:.2f}, {y:.2f}) m",
     ("heading_rad",): lambda heading: f"at a heading of {np.degrees(heading):.0f}°",
+    ("turned_rad",): turned_in_words,
     ("time_in_trial_s",): lambda t_s: f"at {seconds(t_s)} of a trial",
     ("session_s",): lambda t_s: f"at {seconds(t_s)} of the session",
 }

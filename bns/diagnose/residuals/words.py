@@ -28,6 +28,7 @@ from bns.diagnose.residuals.grammar import (
     SURFACE,
     SURFACE_KNOTS,
     TRAVEL,
+    TWIST,
 )
 from bns.diagnose.residuals.past_in_words import changes, one_wheel, response, reversal, slowing, swing, work
 from bns.diagnose.residuals.phrases import POINTS, VELOCITIES, curve_of, slower
@@ -37,6 +38,7 @@ from bns.diagnose.residuals.places_in_words import (
     share_by_heading,
     time_in_trial,
     travel,
+    twist,
     velocity_by_heading,
 )
 from bns.diagnose.residuals.symbolic import Formula
@@ -82,6 +84,7 @@ _NAMES = {
     "x": "place",
     "y": "place",
     "heading": "heading",
+    "turned": "turn since the trial began",
     "u": "its speed",
 }
 
@@ -203,7 +206,8 @@ def _largest(term: Formula, predictor: Predictor) -> str:
         "r": right,
         "moving": np.ones_like(left),
     }
-    of = {"x": "x_m", "y": "y_m", "heading": "heading_rad", "tau": "time_in_trial_s", "t": "session_s", "d": "way_m"}
+    of = {"x": "x_m", "y": "y_m", "heading": "heading_rad", "turned": "turned_rad"}
+    of |= {"tau": "time_in_trial_s", "t": "session_s", "d": "way_m"}
     places = {name: seen[variable].ravel() for name, variable in of.items() if variable in seen}
     change = np.abs(np.broadcast_to(value_of(term.term, {**term.values, **names, **places}), left.shape))
     size = float(np.quantile(change[np.isfinite(change)], 0.95))
@@ -221,6 +225,7 @@ _SAID: dict[tuple[str, str], Callable[[Formula, Predictor], str]] = {
     ("heading", "v"): velocity_by_heading,
     ("heading", "w"): velocity_by_heading,
     (PULL, "w"): velocity_by_heading,
+    (TWIST, "w"): twist,
     (TRAVEL, "v"): travel,
     (STRAIGHT, "w"): _straight,
     ("distance since each wheel reversed", "wheels"): reversal,

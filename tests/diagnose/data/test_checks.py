@@ -11,6 +11,7 @@ from bns.api.compare import compare
 from bns.api.measurements import Measurements
 from bns.api.model import Model
 from bns.diagnose.data.checks import checked
+from bns.diagnose.data.load import _tracks
 from bns.diagnose.data.still_heading import _turned_m
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.data.units import _check_length, check_units
@@ -223,6 +224,17 @@ def test_jumps_are_found_also_in_pairs_and_at_the_ends(table):
     assert sorted(f.row for f in findings if "jumps" in f.text) == rows
     assert usable.loc[rows, "x_m"].isna().all()
     assert usable["x_m"].isna().sum() == len(rows)
+
+
+@pytest.mark.parametrize("off_m", np.linspace(0.1, 0.4, 7))
+def test_a_first_or_last_pose_that_is_wrong_is_lost_and_not_the_trial(table, off_m):
+    """The line from it to the next but one puts the sound pose between them as far off, but for noise."""
+    broken = table.copy()
+    ends = [row for _, rows in table.groupby("trial") for row in (rows.index[0], rows.index[-1])]
+    broken.loc[ends, "y_m"] += off_m
+    usable, findings = checked(broken)
+    assert sorted(f.row for f in findings if "jumps" in f.text) == sorted(ends)
+    assert len(_tracks(broken)[0].t_s) == len(table) - len(ends)
 
 
 def test_a_pose_that_is_held_and_catches_up_is_no_jump(table):

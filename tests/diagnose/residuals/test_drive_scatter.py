@@ -1,6 +1,7 @@
 """The scatter of a drive as the cause of an error: compared with a walk at random that is drawn here, frame by frame."""
 
 import re
+from itertools import islice
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 from bns.diagnose import diagnosing
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.report import text
+from bns.diagnose.report.plain_language import ABOVE_NOISE, headline, nothing_above_noise
 from bns.diagnose.residuals.drive_scatter import scatter_in_words, wandering_m
 from tests.diagnose.worlds import NOMINAL, measured
 
@@ -83,11 +86,23 @@ def test_it_is_said_where_it_makes_the_error_and_the_error_is_above_noise():
     assert f"makes only {1e3 * by_drive:.3g} mm. In the rest no listed effect" in said
     (said,) = scatter_in_words(predictor, NOISE, errors(0.6 * by_drive))  # from pose to pose more, and it goes back
     assert f"({0.6e3 * by_drive:.3g} mm) is far above tracking noise (2 mm)" in said
-    assert f"would be {1e3 * by_drive:.3g} mm off. So these jumps take one another back" in said
+    assert f"would be {1e3 * by_drive:.3g} mm off. So its jumps take one another back, or are rare" in said
     assert scatter_in_words(predictor, NOISE, errors(0.6 * by_drive, floor_m=0.5 * by_drive)) == []
     assert scatter_in_words(predictor, NOISE, errors(by_drive, floor_m=0.6 * by_drive)) == []  # near noise: no question
     assert scatter_in_words(predictor, NOISE, errors(by_drive, floor_m=np.nan)) == []
     assert scatter_in_words(predictor, NOISE, SimpleNamespace(horizons={})) == []
+
+
+def test_a_verdict_that_finds_nothing_says_that_the_error_is_above_noise():
+    for rms_m, floor_m, verdict, says in ((0.03, 0.01, "none", True), (0.019, 0.01, "none", False), (0.03, np.nan, "none", False),
+                                          (0.03, 0.01, "effects", False)):  # fmt: skip
+        found = SimpleNamespace(verdict=verdict, errors=errors(rms_m, floor_m=floor_m), effects=("a",), numbers={}, selection=None)
+        assert nothing_above_noise(found) == says
+    found = SimpleNamespace(verdict="none", errors=errors(0.03, floor_m=0.01), effects=(), numbers={}, selection=None)
+    assert headline(found) == "Nothing is missing from the model that these measurements could show. " + ABOVE_NOISE
+    verdict, said = islice(text._diagnosis(found, (), {}), 2)
+    assert verdict == "verdict: none"
+    assert said == "Nothing is missing that these measurements could show. " + ABOVE_NOISE
 
 
 def two_horizons():
@@ -101,7 +116,7 @@ def two_horizons():
 def test_wheels_that_vary_over_parts_of_a_second_scatter_more_over_seconds_than_from_pose_to_pose():
     predictor, short, whole = two_horizons()
     (said,) = scatter_in_words(predictor, NOISE, errors(2.2 * whole, shorter_m=np.hypot(2.0 * short, 0.002)))
-    assert "because the drive itself scatters: grown as a walk at random grows, the error over 1 second makes" in said
+    assert "as if the drive itself scattered: grown as a walk at random grows, the error over 1 second makes" in said
     assert f"makes {2e3 * whole:.3g} mm. From pose to pose it scatters less ({1e3 * whole:.3g} mm)" in said
     for shorter_m in (1.2 * short, 0.001, 5.0 * short):  # too little, below the noise, and more than all
         (said,) = scatter_in_words(predictor, NOISE, errors(2.2 * whole, shorter_m=shorter_m))
