@@ -73,6 +73,24 @@ def standing_beside(
     return next_to, lost, new, _errors_with_terms(next_to.selection, given, found) if found.terms else None
 
 
+def beside_those_that_stand(
+    stands: Standing, rest: Unexplained, predictor: Predictor, given: Model, response: bool | None, tick: Callable[[str], None]
+) -> tuple[Established, Standing, tuple[str, ...], PairedErrors | None]:
+    """The search again beside effects that stand, for terms that were found beside others as well; none where nothing is left.
+
+    With terms that were fitted beside an effect that does not stand, the model would be half of an explanation. None of the
+    ``stands.withdrawn`` comes back. Returns the terms, the effects that stand beside them, those lost, and the errors.
+    """
+    found = sought_terms(stands.selection, predictor, rest, response, stands.withdrawn)
+    if found is None:
+        selection = stands.selection
+        return Established(selection.accepted, (), selection.problem, selection.fit), stands, (), None
+    found = without_absurd(found, replace(stands, rest=rest), predictor, response, stands.withdrawn)
+    next_to, lost, _, errors = standing_beside(found, stands, predictor, given, tick)
+    gone = tuple(name for name in stands.withdrawn if name not in next_to.withdrawn)
+    return found, replace(next_to, withdrawn=(*gone, *next_to.withdrawn)), lost, errors
+
+
 def _errors_with_terms(selection: SelectionResult, given: Model, found: Established) -> PairedErrors:
     """Of the model as given, with the effects, and with the terms in addition, on the same windows."""
     predictor, pose_filter = selection.problem.predictor, selection.problem.pose_filter

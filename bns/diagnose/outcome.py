@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from bns.diagnose.beside_terms import (
+    beside_those_that_stand,
     does_better_than_more,
     sought_terms,
     standing_beside,
@@ -114,6 +115,9 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
             if again is not None:
                 found = without_absurd(again, stands, predictor, response, new)
                 next_to, lost, new, errors = standing_beside(found, stands, predictor, given, tick)
+        while set(next_to.withdrawn) & set(found.names):
+            found, next_to, more, errors = beside_those_that_stand(next_to, stands.rest, predictor, given, response, tick)
+            lost = (*lost, *more)
         unseen = unseen and not does_better_than_more(found, stands.selection, lost)
         matters = errors is None or terms_matter(errors)
         if unseen or (not matters and next_to.rest.any and not unexplained_beside(found).any):

@@ -43,6 +43,8 @@ BY_DIRECTION = {
     RIGHT: "speed of the right wheel, forwards and backwards",
 }
 """A curve of its own in each direction: what an odd one beside a share cannot draw, others would repair between them."""
+ALONG = "forward velocity, forwards and backwards"
+"""What the robot as a whole loses on the way, whatever its wheels do: a caster that drags, a cable that is pulled along."""
 OF_SPEED = {WHEELS: "speed of each wheel", LEFT: "speed of the left wheel", RIGHT: "speed of the right wheel"}
 PLACE, STEPPED, SURFACE = "place", "speed in steps", "speed with turn"
 SPEED_THERE = "forward speed at a place"
@@ -96,6 +98,7 @@ def families(predictor: Predictor, wheelbase_m: float, response: bool = True) ->
     found = [
         *(Family(signal, on, of_speed) for on, signal in OF_SPEED.items()),
         *(Family(signal, on, by_direction) for on, signal in BY_DIRECTION.items() if reverses),
+        *_along(seen),
         Family("speed and turn", "v", ("v * w", "v * w**2", "v * abs(v)", "v**3", "moving * abs(w)")),
         Family("speed and turn", "w", ("w * abs(w)", "w * abs(v)", "w**3", "w * v**2", "w * v", "v * abs(w)")),
         Family("speed and turn", "s", ("v * w * abs(w)", "v * w * abs(v)", "w")),
@@ -119,15 +122,22 @@ def may_join(terms: Iterable[tuple[str, str]], tried: Iterable[Family]) -> list[
     return [f for f in tried if (f.signal, f.on) not in used and f.signal not in barred]
 
 
+def _along(seen: dict[str, Array]) -> Iterator[Family]:
+    """Two free curves of the robot's forward velocity, of logs in which it drives backwards, too."""
+    v = (seen["left_m_s"] + seen["right_m_s"]) / 2.0
+    if float(v.min()) < 0.0:
+        yield Family(ALONG, "v", _by_direction([share * float(np.abs(v).max()) for share in SPEED_KNOTS], "v"))
+
+
 def _of_speed(knots: Sequence[float], reverses: bool) -> tuple[str, ...]:
     """A free curve of a wheel's own speed that is nothing at rest, odd but for a share of backward speeds."""
     hats = _hats("abs(u)", knots)[1:]
     return (*(f"sign(u) * {h}" for h in hats), *(("min(u, 0)",) if reverses else ()))
 
 
-def _by_direction(knots: Sequence[float]) -> tuple[str, ...]:
-    """Two free curves of a wheel's own speed that are nothing at rest: one forwards, one backwards."""
-    return tuple(hat for ahead in ("u", "-u") for hat in _hats(f"({ahead})", knots)[1:])
+def _by_direction(knots: Sequence[float], speed: str = "u") -> tuple[str, ...]:
+    """Two free curves of a wheel's own speed, or of the robot's, that are nothing at rest: one forwards, one backwards."""
+    return tuple(hat for ahead in (speed, f"-{speed}") for hat in _hats(f"({ahead})", knots)[1:])
 
 
 def _surfaces(seen: dict[str, Array], lasted_s: Array, wheelbase_m: float) -> Iterator[Family]:

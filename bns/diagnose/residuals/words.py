@@ -10,6 +10,7 @@ from bns.diagnose.data.tracks import Array
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.grammar import (
+    ALONG,
     BY_DIRECTION,
     CHANGES,
     CHANGES_ALONE,
@@ -144,6 +145,15 @@ def _speed(term: Formula, predictor: Predictor) -> str:
     return f"{whose}'s speed is not proportional to its command: {pairs}"
 
 
+def _along(term: Formula, predictor: Predictor) -> str:
+    """Of curves of the robot's forward velocity: what some speeds come to, forwards and backwards."""
+    v, _ = driven(term.fit.model, predictor)
+    ends = [np.array([0.3, 1.0]) * float(one) for one in (v.max(), v.min()) if one]
+    at = np.concatenate(ends) if ends else np.zeros(0)
+    pairs = [f"{one:.2g} m/s {_slower_way(c * np.sign(one))}" for one, c in zip(at, curve_of(term, "v", at), strict=True)]
+    return f"forward motion is not proportional to its command, whatever the robot turns: {', '.join(pairs)}"
+
+
 def _surface(term: Formula, predictor: Predictor) -> str:
     """Of a free surface over speed and turn rate: how much, from the least to the most that usual commands see, and where."""
     v, w = driven(term.fit.model, predictor)
@@ -235,6 +245,7 @@ _SAID: dict[tuple[str, str], Callable[[Formula, Predictor], str]] = {
     ("speed of the right wheel", "right"): _speed,
     ("recent work of each wheel", "wheels"): work,
     ("speed in steps", "wheels"): _steps,
+    (ALONG, "v"): _along,
     **{(signal, on): _speed for on, signal in BY_DIRECTION.items()},
     (CHANGES, "wheels"): changes,
     **{(signal, on): changes for on, signal in CHANGES_ALONE.items()},

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from itertools import combinations
 
+import numpy as np
+
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.plausibility import at_bound
@@ -137,10 +139,12 @@ class LookBack:
 def _from_their_numbers(problem: Problem, fit: Fit, pair: tuple[str, str], effect: Effect) -> Fit | None:
     """The fit with an effect in the place of two, from their numbers of the same names; None if they have none.
 
-    Far from both, under the small noise of a good model, a fit ends in another valley.
+    Far from both, under the small noise of a good model, a fit ends in another valley. A name may mean something else there: a
+    number that this effect cannot have is none of its own.
     """
     known = {**fit.model.values_of(pair[0]), **fit.model.values_of(pair[1])}
-    if not any(p.name in known for p in effect.parameters):
+    own = {p.name: known[p.name] for p in effect.parameters if p.low <= known.get(p.name, np.nan) <= p.high}
+    if not own:
         return None
     bare = fit.model.without(pair[0]).without(pair[1])
-    return problem.fit(bare.with_active(effect, tuple(known.get(p.name, p.neutral) for p in effect.parameters)))
+    return problem.fit(bare.with_active(effect, tuple(own.get(p.name, p.neutral) for p in effect.parameters)))

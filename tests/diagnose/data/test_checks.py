@@ -232,8 +232,7 @@ def test_a_first_or_last_pose_that_is_wrong_is_lost_and_not_the_trial(table, off
     broken = table.copy()
     ends = [row for _, rows in table.groupby("trial") for row in (rows.index[0], rows.index[-1])]
     broken.loc[ends, "y_m"] += off_m
-    usable, findings = checked(broken)
-    assert sorted(f.row for f in findings if "jumps" in f.text) == sorted(ends)
+    assert sorted(f.row for f in checked(broken)[1] if "jumps" in f.text) == sorted(ends)
     assert len(_tracks(broken)[0].t_s) == len(table) - len(ends)
 
 

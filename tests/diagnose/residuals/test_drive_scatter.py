@@ -94,9 +94,13 @@ def test_it_is_said_where_it_makes_the_error_and_the_error_is_above_noise():
 
 
 def test_a_verdict_that_finds_nothing_says_that_the_error_is_above_noise():
-    for rms_m, floor_m, verdict, says in ((0.03, 0.01, "none", True), (0.019, 0.01, "none", False), (0.03, np.nan, "none", False),
-                                          (0.03, 0.01, "effects", False)):  # fmt: skip
-        found = SimpleNamespace(verdict=verdict, errors=errors(rms_m, floor_m=floor_m), effects=("a",), numbers={}, selection=None)
+    for error_m, floor_m, verdict, says in (
+        (0.03, 0.01, "none", True),
+        (0.019, 0.01, "none", False),
+        (0.03, np.nan, "none", False),
+        (0.03, 0.01, "effects", False),
+    ):
+        found = SimpleNamespace(verdict=verdict, errors=errors(error_m, floor_m=floor_m))
         assert nothing_above_noise(found) == says
     found = SimpleNamespace(verdict="none", errors=errors(0.03, floor_m=0.01), effects=(), numbers={}, selection=None)
     assert headline(found) == "Nothing is missing from the model that these measurements could show. " + ABOVE_NOISE

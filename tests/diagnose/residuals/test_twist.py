@@ -1,4 +1,4 @@
-"""What winds up as the robot turns and unwinds as it turns back: a cable that hangs on it, by an integration of this file's own."""
+"""What winds up as the robot turns and unwinds as it turns back, such as a cable: by an integration of this file's own."""
 
 import numpy as np
 import pandas as pd

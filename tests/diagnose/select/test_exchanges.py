@@ -404,6 +404,18 @@ def test_one_effect_in_the_place_of_two_begins_from_their_numbers():
     assert look_back._from_their_numbers(problem, fit, pair, effect_named("speed-gain")) is None
 
 
+def test_a_number_of_the_same_name_that_an_effect_cannot_have_is_none_of_its_own():
+    """left_share of a sliding contact says where it is, and may be negative; that of a dead zone may not."""
+    model = NOMINAL.with_effect("sliding-contact", friction_m_s=0.01, distance_share=0.5, left_share=-0.005)
+    model, pair = model.with_effect("dead-zone", width_m_s=0.02), ("sliding-contact", "dead-zone")
+    fit, problem = SimpleNamespace(model=model), SimpleNamespace(fit=lambda one: one)
+    effect = effect_named("dead-zone-mismatch")
+    begun = look_back._from_their_numbers(problem, fit, pair, effect)
+    assert begun.values_of("dead-zone-mismatch") == {"width_m_s": 0.02, "left_share": 1.0}
+    alone = SimpleNamespace(model=model.without("dead-zone").with_effect("speed-gain", gain=0.9))
+    assert look_back._from_their_numbers(problem, alone, ("sliding-contact", "speed-gain"), effect) is None
+
+
 def test_the_lower_of_both_beginnings_counts(monkeypatch):
     catalogue = {name: an_effect(name, 1) for name in ("a", "b", "lag")} | {"scrub": an_effect("scrub", 3, "lag")}
     search = LookBack.__new__(LookBack)

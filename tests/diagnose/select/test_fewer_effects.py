@@ -23,7 +23,7 @@ from bns.diagnose.residuals import restored
 from bns.diagnose.residuals.established import Established
 from bns.diagnose.residuals.outliers import Outlier
 from bns.diagnose.residuals.symbolic import fitted
-from bns.diagnose.residuals.unexplained import Unexplained
+from bns.diagnose.residuals.unexplained import NOTHING, Unexplained
 from bns.diagnose.select import result
 from bns.diagnose.select.result import SelectionResult, SelectionStep
 from bns.diagnose.select.stepwise import StepwiseSelection
@@ -358,3 +358,34 @@ def test_a_curve_that_predicts_better_by_luck_does_not_bar_an_effect(monkeypatch
 
 
 PAIR = ("effects", "terms")
+
+
+@pytest.mark.parametrize("left", [True, False])
+def test_terms_are_searched_again_beside_the_effects_that_stand(late, monkeypatch, left):
+    """With mocked parts: the terms were fitted beside two effects, one of which raises the error; ``left``: something is left."""
+    both, kept = standing(late, "wheelbase", "speed-gain"), standing(late, "wheelbase")
+    rest = replace(NOTHING, residual_dependence=("something",))
+    stands, next_to = (standing_module.Standing(one, None, (), [], rest) for one in (both, kept))
+    first = Established(both.accepted, ("a term",), both.problem, both.fit)
+    second = Established(kept.accepted, ("another",), kept.problem, kept.fit)
+    errors, asked = SimpleNamespace(falls=True, falls_in_the_end=False), []
+    monkeypatch.setattr(outcome, "standing_of", lambda *_: stands)
+    monkeypatch.setattr(outcome, "beside_the_floor", lambda *_: (stands, ()))
+    monkeypatch.setattr(outcome, "sought_terms", lambda *_: first)
+    monkeypatch.setattr(outcome, "standing_beside", lambda *_: (replace(next_to, withdrawn=("speed-gain",)), (), (), errors))
+    monkeypatch.setattr(outcome, "terms_matter", lambda _: True)
+    monkeypatch.setattr(outcome, "_within_noise", lambda _: False)
+    monkeypatch.setattr(outcome, "best_formula", lambda *_: None)
+
+    def again(selection, _predictor, rest, _response, barred):
+        asked.append((selection.accepted, rest, barred))
+        return second if left else None
+
+    monkeypatch.setattr(beside_terms, "sought_terms", again)
+    monkeypatch.setattr(beside_terms, "standing_beside", lambda *_: (next_to, (), (), errors))
+    for module in (outcome, beside_terms):
+        monkeypatch.setattr(module, "without_absurd", lambda found, *_: found)
+    ended = outcome.outcome_of(both, late, NOMINAL, lambda _: None)
+    assert asked == [(("wheelbase",), rest, ("speed-gain",))]
+    assert (ended.selection.accepted, ended.withdrawn) == (("wheelbase",), ("speed-gain",))
+    assert ended.terms == (("another",) if left else ())
