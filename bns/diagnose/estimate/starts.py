@@ -115,13 +115,20 @@ def _from_lower_places(problem: Problem, fit: Fit) -> Fit:
 
 
 def best_start(problem: Problem, base: Fit, effect: Effect, known: Model | None = None) -> StartingPoint:
-    """The fitted model with the effect at the most promising of its starts, one step of least squares taken."""
+    """The fitted model with the effect at the most promising of its starts, one step of least squares taken.
+
+    An effect with a jagged loss, beside one that looks like it, is judged after that step: what the other one makes up for now,
+    such as a lag for the ticks of a clock, has to give way first.
+    """
     lows, highs = ([getattr(p, end) for p in effect.parameters] for end in ("low", "high"))
     found = (tuple(np.clip(values, lows, highs).tolist()) for values in _starts(effect, problem.predictor, base.model))
     starts = [base.model.with_active(effect, values) for values in found]
     if known is not None and effect.name in {active.effect.name for active in known.effects}:
         starts.append(base.model.with_active(effect, tuple(known.values_of(effect.name).values())))
     losses = [problem.loss(start) for start in starts]
+    beside = {active.effect.name for active in base.model.effects} & set(effect.lookalikes)
+    if beside and len(starts) > 1 and any(p.jagged for p in effect.parameters):
+        return min((problem.gauss_newton_step(start, base) for start in starts), key=lambda one: one.loss)
     best = int(np.argmin(losses))
     stepped = problem.gauss_newton_step(starts[best], base)
     return stepped if stepped.loss < losses[best] else replace(stepped, model=starts[best], loss=losses[best])

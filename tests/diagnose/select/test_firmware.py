@@ -9,6 +9,8 @@ from bns.diagnose.diagnosing import diagnose
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_extended, fit_with, listed
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.physics.effects import command_rate, effect_named
+from bns.physics.signals import Wheels
 from tests.diagnose.worlds import BASE_M, FRAME_S, NOMINAL, hidden, measured
 
 
@@ -98,6 +100,50 @@ def test_a_step_is_found_in_commands_that_change_all_the_time(name, cut, gap_at)
 def test_commands_of_a_joystick_that_are_cut_off_are_no_friction_and_steps():
     found = diagnose(by_joystick(0.03, np.trunc), NOMINAL)
     assert (found.verdict, found.effects) == ("effects", ("command-truncation",))
+
+
+def on_ticks(period_s, tau_s=0.0, trials=30, lasting_s=9.0, seed=11):
+    """By this test's own integrator: commands of 0.3 to 0.9 s, taken at the ticks of a clock, and followed with a lag."""
+    rng, rows, within = np.random.default_rng(seed), [], 60
+    dt = FRAME_S / within
+    for trial in range(trials):
+        at = np.append(0.0, np.cumsum(rng.uniform(0.3, 0.9, 40)))
+        at = at[at < lasting_s]
+        told = rng.uniform(-0.25, 0.25, (len(at), 2))
+        frames = int(lasting_s / FRAME_S)
+        times = np.arange(frames * within) * dt
+        taken = told[np.searchsorted(at, np.floor(times / period_s + 1e-9) * period_s + 1e-9, side="right") - 1]
+        speed = taken if not tau_s else np.zeros_like(taken)
+        for k in range(1, len(times) if tau_s else 0):
+            speed[k] = taken[k] + (speed[k - 1] - taken[k]) * np.exp(-dt / tau_s)
+        heading = np.append(0.0, np.cumsum((speed[:, 1] - speed[:, 0]) / BASE_M * dt)[:-1])
+        x_m, y_m = (np.append(0.0, np.cumsum(speed.mean(axis=1) * f(heading) * dt)[:-1]) for f in (np.cos, np.sin))
+        seen = np.column_stack([x_m, y_m, heading])[::within] + rng.normal(size=(frames, 3)) * [1e-3, 1e-3, 4e-3]
+        poses = pd.DataFrame(seen, columns=["x_m", "y_m", "heading_rad"]).assign(t_s=np.arange(frames) * FRAME_S)
+        commands = pd.DataFrame(told, columns=["left_m_s", "right_m_s"]).assign(t_s=at)
+        rows.append(pd.concat([commands, poses]).sort_values("t_s", kind="stable").assign(trial=trial))
+    table = pd.concat(rows, ignore_index=True)
+    table[["left_m_s", "right_m_s"]] = table[["left_m_s", "right_m_s"]].ffill()
+    return WheelPredictor(tracks_of(table))
+
+
+@pytest.mark.parametrize(("period_s", "tau_s"), [(0.1307, 0.0), (0.0913, 0.08), (0.2217, 0.15)])
+def test_ticks_of_no_round_period_are_seen_before_any_fit(period_s, tau_s):
+    """A tick late in a trial falls into the right frame only within a hundredth of a frame: 0.2 ms here."""
+    predictor = on_ticks(period_s, tau_s, trials=12)
+    found = predictor.starts_of(listed(NOMINAL, None, predictor.tracks)["command-rate"], NOMINAL)
+    assert min(abs(one - period_s) for (one,) in found) < 0.25 * period_s**2 / 9.0
+    untracked = Wheels(np.full((1, 4), 0.1), np.ones((1, 4)), np.ones((1, 4)), BASE_M)
+    assert effect_named("command-rate").starts_from(untracked) == tuple((one,) for one in command_rate._ROUND)
+
+
+@pytest.mark.slow
+def test_ticks_of_no_round_period_before_a_lag_are_named_with_their_numbers():
+    """Beside a lag that stands for both, a period at whose ticks wheels are later fits only when the lag gives way."""
+    found = diagnose(on_ticks(0.1307, 0.07), NOMINAL)
+    assert (found.verdict, set(found.effects)) == ("effects", {"command-rate", "motor-lag"})
+    assert found.numbers["command-rate"]["period_s"]["value"] == pytest.approx(0.1307, abs=2e-4)
+    assert found.numbers["motor-lag"]["tau_s"]["value"] == pytest.approx(0.07, rel=0.02)
 
 
 def test_a_wheel_that_starts_late_is_found_from_one_that_stops_at_the_same_command():
