@@ -54,8 +54,7 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
     ``shorten``: so large a share of all children loses commands (`bns.approaches.parts.shortening`).
 
     ``polish``: under noise, so many steps of a local search follow each round, from the surest controller on
-    (`bns.approaches.parts.polishing`). ``join``: so many times, two commands of what it found are joined into one and
-    their neighbours searched anew: noise comes with each command, and evolution's lists are longer than a task asks for.
+    (`bns.approaches.parts.polishing`).
 
     ``ensemble``: so many networks for each displacement (`bns.approaches.parts.ensemble`). ``use``: evolution works on
     their mean, on the one that thinks worst of a controller, or on one of them, drawn for each round.
@@ -77,7 +76,6 @@ class BootstrappedNeuroSimulation(NeuroSimulation):
         "missed": Option(0.0, 0.0, 1000.0, "m that each goal missed under noise, and failing, costs beyond the robot's penalty"),
         "shorten": Option(0.0, 0.0, 1.0, "fraction of each generation's children that lose commands"),
         "polish": Option(0, 0, 1000, "steps of a local search on the surest controller after each round, under noise; 0: none"),
-        "join": Option(0, 0, 1000, "attempts after each round's polishing to join two commands into one; 0: none"),
         "ensemble": Option(1, 1, 100, "networks for each displacement"),
         "use": Choice("mean", USES, "what evolution works on where networks are several"),
         "informed": Option(0.0, 0.0, 1.0, "fraction of the population, fittest first, of which the most informative is driven"),

@@ -26,25 +26,18 @@ GROWTH, DECAY = 1.1, 0.97
 """Factor of this size after a step that helped, and after one that did not."""
 REMOVALS, FEW = 0.1, 0.45
 """Shares of the lists that are tried: those that lose a command, those with few changed components; in the rest, all change."""
-JOINED_STEPS, JOINED_DECAY, NEAR = 6, 0.8, (1, 2, 4)
-"""Where two commands were joined: steps of the search, the factor of the change's size after one that did not help, and how many
-commands on either side change, one of these at random."""
 
 
 def check_polish(setting: Setting) -> None:
-    """SpecError for a search for success under noise where there is no noise, or for commands joined without such a search."""
+    """SpecError for a search for success under noise where there is no noise."""
     if setting.options["polish"] and not setting.options["noise"]:
         raise SpecError("approach bns+polish: it searches for success under noise, and there is none; add noise=16.")
-    if setting.options["join"] and not setting.options["polish"]:
-        raise SpecError("approach bns+join: commands are joined in what was polished, and nothing is; add polish=10.")
 
 
 def polished(simulator: NoisySimulator, lists: Sequence[np.ndarray], setting: Setting, number: int) -> np.ndarray:
     """The end (m, components) of a search from the surest of lists (n, components); ``number`` of the round: its draws.
 
-    In this round's draws it succeeds at least as often as each of them. Then two commands in succession are joined into one
-    (`Khepera.joined`), as often as ``join`` says: what is near them is searched anew, and the shorter list is kept if it
-    succeeds as often as the longer one.
+    In this round's draws it succeeds at least as often as each of them.
     """
     stream, random = RandomStream(setting.own_key("polishing"), number), setting.generator(number)
     best, size = lists[_surest(simulator, lists, setting.task, stream)], FIRST
@@ -53,35 +46,7 @@ def polished(simulator: NoisySimulator, lists: Sequence[np.ndarray], setting: Se
         found = _surest(simulator, tried, setting.task, stream)
         size = min(size * GROWTH, LARGEST) if found else max(size * DECAY, SMALLEST)
         best = tried[found]
-    for _ in range(setting.whole("join")):
-        if len(best) <= max(2, setting.spec.min_commands):
-            break
-        shorter = _shorter(simulator, best, setting, stream, random)
-        best = (shorter, best)[_surest(simulator, (shorter, best), setting.task, stream)]
     return best.copy()
-
-
-def _shorter(
-    simulator: NoisySimulator, commands: np.ndarray, setting: Setting, stream: RandomStream, random: np.random.Generator
-) -> np.ndarray:
-    """Two commands of the list joined, and a search among the commands near them."""
-    robot: Any = setting.robot
-    at, size = int(random.integers(len(commands) - 1)), FIRST
-    both = robot.joined(commands[at], commands[at + 1])
-    best = np.concatenate([commands[:at], both[None], commands[at + 2 :]])
-    for _ in range(JOINED_STEPS):
-        tried = [best, *(_moved_near(best, at, size, setting, random) for _ in range(PROPOSALS))]
-        found = _surest(simulator, tried, setting.task, stream)
-        size = min(size * GROWTH, LARGEST) if found else max(size * JOINED_DECAY, SMALLEST)
-        best = tried[found]
-    return best
-
-
-def _moved_near(commands: np.ndarray, at: int, size: float, setting: Setting, random: np.random.Generator) -> np.ndarray:
-    """All components of the commands around one moved a little."""
-    reach, which = int(random.choice(NEAR)), np.zeros(commands.shape, bool)
-    which[max(0, at - reach) : at + reach + 1] = True
-    return _moved(commands, which, size * random.choice([0.2, 1.0, 3.0]), setting, random)
 
 
 def _surest(simulator: NoisySimulator, lists: Sequence[np.ndarray], task: Task, stream: RandomStream) -> int:
@@ -95,17 +60,13 @@ def _surest(simulator: NoisySimulator, lists: Sequence[np.ndarray], task: Task, 
 
 def _changed(commands: np.ndarray, size: float, setting: Setting, random: np.random.Generator) -> np.ndarray:
     """A command left out, few components moved, or all of them a little."""
+    robot: Any = setting.robot
+    low, high = robot.bounds.low, robot.bounds.high
     n, kind = len(commands), random.random()
     if kind < REMOVALS and n > setting.spec.min_commands:
         return np.delete(commands, random.integers(n), axis=0)
     few = kind < REMOVALS + FEW
     which = random.random(commands.shape) < max(0.1, 0.5 / n) if few else np.ones(commands.shape, bool)
-    return _moved(commands, which, size * random.choice([0.2, 1.0, 3.0] if few else [0.1, 0.3]), setting, random)
-
-
-def _moved(commands: np.ndarray, which: np.ndarray, scale: float, setting: Setting, random: np.random.Generator) -> np.ndarray:
-    """Some components (n, components) moved at random, by ``scale`` of their ranges, within bounds."""
-    robot: Any = setting.robot
-    low, high = robot.bounds.low, robot.bounds.high
+    scale = size * random.choice([0.2, 1.0, 3.0] if few else [0.1, 0.3])
     moved = commands + which * random.standard_normal(commands.shape) * scale * (high - low).astype(np.float64)
     return np.clip(moved, low, high).astype(np.float32)

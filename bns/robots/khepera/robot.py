@@ -85,12 +85,6 @@ class Khepera:
         commands = (LOW + u * (HIGH - LOW)).astype(np.float32)
         return Population(commands, np.full(count, length, np.int32))
 
-    def joined(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """One command (3,) in the place of two: it lasts as long as both, and turns each wheel as far, within bounds."""
-        lasting = np.array([first[2], second[2]], np.float64)
-        left, right, _ = lasting @ np.stack([first, second]) / lasting.sum()
-        return np.clip([left, right, lasting.sum()], LOW, HIGH).astype(np.float32)
-
     def perturb(self, commands: np.ndarray, key: Key, step: int) -> np.ndarray:
         """Commands (n, 3), each component moved within its mutation span."""
         u = uniforms(key, Purpose.PROBE, step, 1, len(commands))[0, :, :3]
