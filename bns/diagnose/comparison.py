@@ -118,8 +118,8 @@ def compare(
 ) -> Comparison:
     """Hold a model as it is against tracks. ``seed`` draws the bootstrap of the bands; ``tick`` is told what is being done.
 
-    ``beside``: further models under their names, as they are, whose errors are paired with this one's; each with a predictor of its
-    own where it is of another body, over the same frames, or None.
+    ``beside``: further models under their names, as they are, whose errors are paired with this one's; each with a predictor of
+    its own where it is of another body, over the same frames, or None.
     """
     tracks = predictor.tracks
     if not (np.diff(tracks.first) > 1).any():

@@ -110,9 +110,9 @@ def test_the_command_says_the_same(log, extended, tmp_path, capsys):
 @pytest.mark.parametrize("alike", [True, False])
 def test_another_body_is_simulated_as_itself(tmp_path, monkeypatch, alike):
     """On the stretches that the first one counts, where the two differ in those that can be foreseen, too."""
-    from bns.diagnose.predict import jointed  # noqa: PLC0415  # MuJoCo is slow to load
-    from tests.jointed.arm import log as moved_arm  # noqa: PLC0415
-    from tests.jointed.arm import xml  # noqa: PLC0415
+    from bns.diagnose.predict import jointed  # MuJoCo is slow to load
+    from tests.jointed.arm import log as moved_arm
+    from tests.jointed.arm import xml
 
     for name, stiffness in (("arm", 6.0), ("soft", 3.0)):
         (tmp_path / f"{name}.xml").write_text(xml(stiffness))
@@ -138,8 +138,8 @@ def test_another_body_is_simulated_as_itself(tmp_path, monkeypatch, alike):
 
 
 def test_another_body_is_seen_at_the_same_sites(tmp_path):
-    from tests.jointed.arm import log as moved_arm  # noqa: PLC0415
-    from tests.jointed.arm import xml  # noqa: PLC0415
+    from tests.jointed.arm import log as moved_arm
+    from tests.jointed.arm import xml
 
     (tmp_path / "arm.xml").write_text(xml())
     (tmp_path / "half.xml").write_text(xml().replace('<site name="elbow" pos="0 0 0"/>', ""))

@@ -99,7 +99,7 @@ class JointedPredictor:
         self.screening: Predictor | None = self._light(chance, _LIGHT)
 
     def on_stretches_of(self, other: JointedPredictor) -> JointedPredictor:
-        """This body on the stretches that another one of the same measurements counts, which may differ in what can be foreseen."""
+        """This body on the stretches that another one of the same measurements counts."""
         if np.array_equal(self._kept, other._kept):
             return self
         new = object.__new__(JointedPredictor)

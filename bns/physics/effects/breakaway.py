@@ -22,9 +22,9 @@ _NEAR = np.linspace(0.92, 1.08, 17)
 
 
 def apply(wheels: Wheels, threshold_m_s: float, stop_ratio: float) -> Wheels:
-    """A wheel stands from a command below ``stop_ratio``·``threshold_m_s``, or of the other direction, to one of ``threshold_m_s``.
+    """A wheel at rest starts at a command of ``threshold_m_s``, one that turns rests below ``stop_ratio``·``threshold_m_s``.
 
-    It stands at the beginning, too.
+    It rests at the beginning and where its command changes sign, too.
     """
     stop = stop_ratio * threshold_m_s
     return wheels.turning(

@@ -240,7 +240,9 @@ def test_names_are_enumerated():
 def test_a_number_without_an_interval_says_why():
     number = {"value": 50.0, "low": 50.0, "high": 50.0, "unit": "1"}
     said = _with_interval("force-limit", "turn_ratio", number)
-    assert said.endswith("= 50 (no interval: one trial only, at a bound, or no small change changes the loss)")
+    assert said.endswith("= 50 (no interval: one trial only, or no small change changes the loss)")
+    said = _with_interval("force-limit", "turn_ratio", number | {"at_bound": True})
+    assert said.endswith("= 50 (no interval: it is at the bound of what it can be)")
     assert _with_interval("motor-lag", "tau_s", number | {"low": 40.0, "unit": "s"}).endswith("= 50 s (95 %: 40 to 50)")
 
 
