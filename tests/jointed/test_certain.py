@@ -1,5 +1,6 @@
 """An effect of a body that is certain by curves alone: the body is simulated itself, and asked for as much there."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -30,6 +31,41 @@ def found(luck="luck", **numbers):
     fit = Fit(model, free, values, np.eye(len(free)), OF_TRIALS, OF_TRIALS, ZEROS, np.zeros((TRIALS, 3, len(free))), spans)
     problem = SimpleNamespace(predictor=SimpleNamespace(luck=luck))
     return SelectionResult(problem, fit, fit, tuple(names), (SelectionStep((), 0.0, "", of=TRIED),))
+
+
+def changed(fell, after=0.5):
+    """Errors that fall to a share of those of the model as given, for certain or perhaps."""
+    at = SimpleNamespace(total=SimpleNamespace(fell=fell), models=[SimpleNamespace(rms_m=1.0), SimpleNamespace(rms_m=after)])
+    return SimpleNamespace(falls=True, horizons={"stretch": at})
+
+
+@pytest.mark.parametrize(
+    ("errors", "luck", "ends"),
+    [
+        ({"tether-pull": (False, 0.8), "floor-slope": (True, 0.56), "dead-band": (True, 0.6)}, "luck", "floor-slope"),
+        ({"tether-pull": (True, 0.8), "floor-slope": (True, 0.56)}, "luck", "tether-pull"),  # certain, so nothing is asked
+        ({"tether-pull": (False, 0.8), "floor-slope": (False, 0.5)}, "luck", "tether-pull"),
+        ({"tether-pull": (False, 0.5), "floor-slope": (True, 0.56)}, "luck", "tether-pull"),
+        ({"tether-pull": (False, 0.8), "floor-slope": (True, 0.56)}, None, "tether-pull"),  # wheels are no curves
+        ({"tether-pull": (False, 0.8), "compliance": (True, 0.56)}, "luck", "tether-pull"),  # the fourth of them
+        ({"tether-pull": (False, 0.8), "payload": (True, 0.56)}, "luck", "tether-pull"),  # not considered
+    ],
+)
+def test_where_the_error_may_not_fall_the_best_alone_are_simulated(monkeypatch, errors, luck, ends):
+    names = ("payload", "tether-pull", "floor-slope", "dead-band", "clock-drift", "compliance")
+    ranking = tuple(SimpleNamespace(name=name, rejected_because="absurd" if name == "payload" else "") for name in names)
+    monkeypatch.setattr(SelectionResult, "withdrawn", lambda self: replace(self, accepted=()))
+    monkeypatch.setattr(standing, "least_certain", lambda _: "")
+    monkeypatch.setattr(standing, "refitted", lambda selection, *_: selection)
+    monkeypatch.setattr(standing, "explained_by", lambda selection, accepted: replace(selection, accepted=accepted))
+    monkeypatch.setattr(
+        standing, "errors_before_and_after", lambda selection, _: changed(*errors.get(selection.accepted[0], (False, 0.9)))
+    )
+    monkeypatch.setattr(standing, "residual_dependence", lambda *_: [])
+    monkeypatch.setattr(standing, "unexplained", lambda *_: None)
+    problem = SimpleNamespace(predictor=SimpleNamespace(luck=luck))
+    searched = SelectionResult(problem, None, None, ("tether-pull",), (SelectionStep(ranking, 0.0, "", of=6),))
+    assert standing.standing_of(searched, None, SNAKE, lambda _: None).selection.accepted == (ends,)
 
 
 def test_of_a_hundred_that_were_tried_one_must_be_told_from_neutral_a_hundred_times_as_surely():
@@ -64,7 +100,7 @@ def test_what_is_not_certain_goes_one_at_a_time_and_the_rest_is_fitted_again(mon
     later = {("joint-zero-joint2", "joint-zero-joint7"): found(joint2=(0.03, 0.01), joint7=(0.095, 0.008))}
     monkeypatch.setattr(SelectionResult, "lacking", lambda self, gone: later[tuple(n for n in self.accepted if n not in gone)])
     monkeypatch.setattr(standing, "refitted", lambda selection, *_: selection)
-    monkeypatch.setattr(standing, "errors_before_and_after", lambda *_: SimpleNamespace(falls=True))
+    monkeypatch.setattr(standing, "errors_before_and_after", lambda *_: changed(True))
     monkeypatch.setattr(standing, "residual_dependence", lambda *_: [])
     monkeypatch.setattr(standing, "unexplained", lambda *_: None)
     stands = standing.standing_of(searched, None, SNAKE, lambda _: None)

@@ -197,7 +197,8 @@ def _with_interval(effect: str, name: str, n: Mapping[str, Any]) -> str:
 def _number(name: str, n: Mapping[str, Any]) -> str:
     said = f"{name} = {n['value']:.5g}{with_unit(n['unit'])}"
     if without_width(n["low"], n["high"]):
-        why = "it is at the bound of what it can be" if n.get("at_bound") else "one trial only, or no small change changes the loss"
+        loose = "one trial only, or no small change changes the loss"
+        why = "it is at the bound of what it can be" if n.get("at_bound") else loose
         return f"{said} (no interval: {why})"
     mean = ", perhaps only the mean of delays that differ: see the notes" if n.get("of_mean") else ""
     beside = ", together with the free term only: see the notes" if n.get("cancels") else mean

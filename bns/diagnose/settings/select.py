@@ -16,6 +16,12 @@ class Select:
         "1",
         "Probability of any false alarm over the whole catalogue: the usual level, divided by the number of effects.",
     )
+    body_alone: int = setting(
+        3,
+        "effects",
+        "Of a body on joints, where the error may not fall with the effects of the search, so many of those that it found alone "
+        f"are simulated in their place; each takes half a minute; {BY_HAND}.",
+    )
     min_gain: float = setting(
         0.001,
         "1",
