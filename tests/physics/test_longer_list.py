@@ -281,7 +281,7 @@ def test_a_wheel_starts_at_a_higher_command_than_it_stops_at():
     for speeds, driven in (
         ((0.07, 0.08, 0.07), 0.15),  # at rest until it is told 0.08, and then on
         ((0.08, 0.04, 0.03, 0.07), 0.12),  # on at half of that, and off below
-        ((0.08, -0.05, 0.05), 0.08),  # a reversal passes through rest
+        ((0.08, -0.05), 0.08),  # a reversal passes through rest
         ((0.08, -0.08, -0.05, 0.0, -0.05), -0.05),  # it breaks away backwards as well, and a stop is a stop
     ):
         lasts = [1.0] * len(speeds)

@@ -150,8 +150,8 @@ def _along(term: Formula, predictor: Predictor) -> str:
     v, _ = driven(term.fit.model, predictor)
     ends = [np.array([0.3, 1.0]) * float(one) for one in (v.max(), v.min()) if one]
     at = np.concatenate(ends) if ends else np.zeros(0)
-    pairs = [f"{one:.2g} m/s {_slower_way(c * np.sign(one))}" for one, c in zip(at, curve_of(term, "v", at), strict=True)]
-    return f"forward motion is not proportional to its command, whatever the robot turns: {', '.join(pairs)}"
+    pairs = [f"{_slower_way(c * np.sign(one))} at {one:.2g} m/s" for one, c in zip(at, curve_of(term, "v", at), strict=True)]
+    return f"forward motion differs from its command, whatever the robot turns: {', '.join(pairs)}"
 
 
 def _surface(term: Formula, predictor: Predictor) -> str:

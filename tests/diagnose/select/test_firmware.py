@@ -132,7 +132,7 @@ def test_ticks_of_no_round_period_are_seen_before_any_fit(period_s, tau_s):
     """A tick late in a trial falls into the right frame only within a hundredth of a frame: 0.2 ms here."""
     predictor = on_ticks(period_s, tau_s, trials=12)
     found = predictor.starts_of(listed(NOMINAL, None, predictor.tracks)["command-rate"], NOMINAL)
-    assert min(abs(one - period_s) for (one,) in found) < 0.25 * period_s**2 / 9.0
+    assert min(abs(one - period_s) for (one,) in found) < 0.1 * period_s**2 / 9.0
     untracked = Wheels(np.full((1, 4), 0.1), np.ones((1, 4)), np.ones((1, 4)), BASE_M)
     assert effect_named("command-rate").starts_from(untracked) == tuple((one,) for one in command_rate._ROUND)
 
