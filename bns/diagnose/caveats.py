@@ -74,8 +74,11 @@ def notes_on(
     yield from _on_slight(found.unseen, slight)
     known = known_effects(selection) if found.negligible else {}
     for name, numbers in found.negligible.items():
-        of_log = name not in known or known[name].of_measuring
-        why = " It may be an artefact of the log, such as rounded time stamps." if of_log else ""
+        why = ""
+        if name not in known or known[name].stage == "clock":
+            why = " It may be an artefact of the log, such as rounded time stamps."
+        elif known[name].of_measuring:
+            why = " It would be an error of the measurement, not of the robot."
         said = ", ".join(f"{key} = {number['value']:.3g}{with_unit(number['unit'])}" for key, number in numbers.items())
         yield (
             f"{name} is certain but negligible ({said}): without it no error on held-out trials is higher by {LEAST_FALL:.0%} or "

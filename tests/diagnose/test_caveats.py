@@ -350,8 +350,17 @@ def test_notes_on_effects_know_whether_something_is_left(monkeypatch, terms, all
     assert told == [all_explained]
 
 
-def test_a_number_without_a_unit_is_written_without_one(monkeypatch):
-    monkeypatch.setattr("bns.diagnose.caveats.known_effects", lambda _selection: {})
+@pytest.mark.parametrize(
+    ("name", "cause"),
+    [
+        ("slope-load", ""),
+        ("camera-scale", " It would be an error of the measurement, not of the robot."),
+        ("clock-drift", " It may be an artefact of the log, such as rounded time stamps."),
+    ],
+)
+def test_a_number_without_a_unit_is_written_without_one(monkeypatch, name, cause):
+    monkeypatch.setattr("bns.diagnose.caveats.known_effects", lambda _selection: all_effects())
+    monkeypatch.setattr("bns.diagnose.caveats.on_effects", lambda *_: [])
     monkeypatch.setattr("bns.diagnose.caveats.on_moved", lambda _: ["What it moves."])
     selection = SimpleNamespace(
         implausible={}, accepted=(), competing_models=(), steps=(SimpleNamespace(ranking=()),),
@@ -361,11 +370,12 @@ def test_a_number_without_a_unit_is_written_without_one(monkeypatch):
     nothing = {**dict.fromkeys(("withdrawn", "unseen", "formula", "errors_with_terms")), "beside_negligible": {}, "kept_for": {}}
     nothing["seen_in_heading"] = {}
     found = SimpleNamespace(
-        **nothing, selection=selection, negligible={"slope-load": numbers}, imitating=(), rest=NOTHING, terms=()
+        **nothing, selection=selection, negligible={name: numbers}, imitating=(), rest=NOTHING, terms=()
     )
     note, moves = notes_on(found, tracks_of(measured(NOMINAL, trials=10)), None)
     assert moves == "What it moves."
     assert "negligible (x_m_s = 0.0026 m/s, behind_share = 0.00124):" in note
+    assert note.endswith(f"so it is not named.{cause}")
 
 
 def test_an_implausible_wheelbase_is_asked_about_with_both_distances():
