@@ -127,11 +127,14 @@ def best_start(problem: Problem, base: Fit, effect: Effect, known: Model | None 
         starts.append(base.model.with_active(effect, tuple(known.values_of(effect.name).values())))
     losses = [problem.loss(start) for start in starts]
     beside = {active.effect.name for active in base.model.effects} & set(effect.lookalikes)
-    if beside and len(starts) > 1 and any(p.jagged for p in effect.parameters):
-        return min((problem.gauss_newton_step(start, base) for start in starts), key=lambda one: one.loss)
-    best = int(np.argmin(losses))
-    stepped = problem.gauss_newton_step(starts[best], base)
-    return stepped if stepped.loss < losses[best] else replace(stepped, model=starts[best], loss=losses[best])
+    followed = range(len(starts)) if beside and any(p.jagged for p in effect.parameters) else [int(np.argmin(losses))]
+    return min((_stepped(problem, base, starts[i], losses[i]) for i in followed), key=lambda one: one.loss)
+
+
+def _stepped(problem: Problem, base: Fit, start: Model, loss: float) -> StartingPoint:
+    """One step of least squares from a start, or the start itself where that is lower."""
+    stepped = problem.gauss_newton_step(start, base)
+    return stepped if stepped.loss < loss else replace(stepped, model=start, loss=loss)
 
 
 def _starts(effect: Effect, predictor: Predictor, model: Model) -> Iterator[tuple[float, ...]]:
