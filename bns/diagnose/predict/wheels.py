@@ -236,10 +236,8 @@ class WheelPredictor:
 
     def _seen(self) -> dict[str, Array]:
         tracks = self.tracks
-        heading = np.concatenate(
-            [np.unwrap(tracks.pose[a:b, 2]) for a, b in zip(tracks.first[:-1], tracks.first[1:], strict=True)]
-        )
-        turned = heading - np.repeat(heading[tracks.first[:-1].clip(max=len(heading) - 1)], np.diff(tracks.first))
+        headings = [np.unwrap(tracks.pose[a:b, 2]) for a, b in zip(tracks.first[:-1], tracks.first[1:], strict=True)]
+        heading, turned = np.concatenate(headings), np.concatenate([one - one[:1] for one in headings])
         extra = {k: v for k, v in tracks.extra.items() if np.isfinite(v).sum() > 1 and k != "session_s"}
         return {"x_m": tracks.pose[:, 0], "y_m": tracks.pose[:, 1], "heading_rad": heading, "turned_rad": turned, **extra}
 
