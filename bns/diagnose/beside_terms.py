@@ -78,14 +78,16 @@ def beside_those_that_stand(
 ) -> tuple[Established, Standing, tuple[str, ...], PairedErrors | None]:
     """The search again beside effects that stand, for terms that were found beside others as well; none where nothing is left.
 
-    With terms that were fitted beside an effect that does not stand, the model would be half of an explanation. None of the
-    ``stands.withdrawn`` comes back. Returns the terms, the effects that stand beside them, those lost, and the errors.
+    With terms that were fitted beside an effect that does not stand, the model would be half of an explanation. No effect comes
+    in now: what looks like the one that went would take its place. Returns the terms, the effects that stand beside them, those
+    lost, and the errors.
     """
-    found = sought_terms(stands.selection, predictor, rest, response, stands.withdrawn)
+    selection = stands.selection
+    known = tuple(known_effects(selection))
+    found = sought_terms(selection, predictor, rest, response, known)
     if found is None:
-        selection = stands.selection
         return Established(selection.accepted, (), selection.problem, selection.fit), stands, (), None
-    found = without_absurd(found, replace(stands, rest=rest), predictor, response, stands.withdrawn)
+    found = without_absurd(found, replace(stands, rest=rest), predictor, response, known)
     next_to, lost, _, errors = standing_beside(found, stands, predictor, given, tick)
     gone = tuple(name for name in stands.withdrawn if name not in next_to.withdrawn)
     return found, replace(next_to, withdrawn=(*gone, *next_to.withdrawn)), lost, errors

@@ -380,7 +380,7 @@ def test_terms_are_searched_again_beside_the_effects_that_stand(late, monkeypatc
     monkeypatch.setattr(outcome, "best_formula", lambda *_: None)
 
     def again(selection, _predictor, rest, _response, barred):
-        asked.append((selection.accepted, rest, barred))
+        asked.append((selection.accepted, rest, set(barred) >= {"speed-gain", "clock-offset", "wheelbase"}))
         return second if left else None
 
     monkeypatch.setattr(beside_terms, "sought_terms", again)
@@ -388,6 +388,6 @@ def test_terms_are_searched_again_beside_the_effects_that_stand(late, monkeypatc
     for module in (outcome, beside_terms):
         monkeypatch.setattr(module, "without_absurd", lambda found, *_: found)
     ended = outcome.outcome_of(both, late, NOMINAL, lambda _: None)
-    assert asked == [(("wheelbase",), rest, ("speed-gain",))]
+    assert asked == [(("wheelbase",), rest, True)]
     assert (ended.selection.accepted, ended.withdrawn) == (("wheelbase",), ("speed-gain",))
     assert ended.terms == (("another",) if left else ())
