@@ -102,7 +102,7 @@ def _surer_alone(
     """
     first = selection.steps[0].ranking if selection.accepted and selection.steps else ()
     names = [c.name for c in first if not c.rejected_because and (c.name,) != selection.accepted][:ALONE]
-    bare = selection.withdrawn()
+    bare = selection.withdrawn() if names else selection
     tried = [refitted(explained_by(bare, (name,)), predictor, given) for name in names]
     judged = [(one, errors_before_and_after(one, given)) for one in tried]
     surer = [pair for pair in judged if _fell(pair[1]) and _relative(pair[1]) < _relative(errors)]
