@@ -17,13 +17,15 @@ class Parser(argparse.ArgumentParser):
     """`argparse.ArgumentParser` with suggestions.
 
     ``rewrite``: from the words of the command line to what they are written as today, for spellings that are on their way out.
-    ``words``: those that are being parsed.
+    ``words``: those that are being parsed. ``old``: what was understood of them in an old spelling (`warn_old`), which is said
+    once all of them are.
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **{**options, "allow_abbrev": False})
         self.rewrite: Callable[[list[str]], list[str]] = list
         self.words: list[str] = []
+        self.old: list[tuple[str, str, str]] = []
 
     def parse_known_args(  # type: ignore[override]  # only as it is called here
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
@@ -36,6 +38,8 @@ class Parser(argparse.ArgumentParser):
         found, unknown = super().parse_known_args(words, namespace)
         if unknown:
             self.error(f"{' '.join(unknown)}: unexpected argument")
+        while self.old:
+            warn_old(*self.old.pop(0))
         return found, unknown
 
     def _own(self, words: list[str]) -> Iterable[str]:
@@ -128,7 +132,7 @@ class OldFolder(argparse.Action):
             parser.error(
                 f"{value} is the name of a figure, not a folder of results. To draw it alone: bns figures --only {value}."
             )
-        warn_old(parser.prog, str(value), f"{self.metavar} {value}")
+        parser.old.append((parser.prog, str(value), f"{self.metavar} {value}"))
         setattr(options, self.dest, Path(value))  # no `type`: that would convert the absence, too
 
 

@@ -182,6 +182,13 @@ def test_a_word_beside_the_folder_of_results_is_refused(command, words, capsys):
     assert "old spelling" not in said
 
 
+def test_beside_an_option_that_there_is_none_of_nothing_is_said_of_old_spellings(capsys):
+    with pytest.raises(SystemExit) as ended:
+        bns(["figures", "-o", "there"])
+    assert ended.value.code == 2
+    assert capsys.readouterr().err.splitlines() == ["bns: -o: unexpected argument. All options: bns figures --help"]
+
+
 @pytest.mark.parametrize("words", [["approaches"], ["success-by-mutation", "--results", "there"]])
 def test_the_name_of_a_figure_is_told_to_be_written_behind_only(words, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
