@@ -18,12 +18,13 @@ _ROUND = (0.04, 0.05, 0.08, 0.1, 0.125, 0.2, 0.25, 0.3, 0.4, 0.5, 0.75, 1.0)
 """Makers choose round periods."""
 _SHORTEST_S, _LONGEST_S = 0.02, 1.5
 """Other periods are looked for between these."""
-_EARLY_S = 3.0
-"""At first in so much of each trial: ticks late in a trial fall into the right frame only very near the true period."""
+_EARLY_S, _LATE_S = 3.0, 30.0
+"""At first in so much of each trial, then in so much: ticks late in a trial fall into the right frame only very near the true
+period, and the work grows with the square of the time that is looked at."""
 _LAGS_S = (0.0, 0.06, 0.15, 0.3)
 """The wheels may follow with a lag."""
 _BEST, _FINE = 3, 0.03
-"""So many of these are then looked for over whole trials, in steps by which the last tick moves by so much of a period."""
+"""So many of these are then looked for in more of each trial, in steps by which its last tick moves by so much of a period."""
 
 
 def apply(wheels: Wheels, period_s: float) -> Wheels:
@@ -40,24 +41,24 @@ def apply(wheels: Wheels, period_s: float) -> Wheels:
 def starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:
     """Round periods, and those at whose ticks, with a lag behind them, the wheels come nearest to the speeds that were seen.
 
-    By least squares over the beginning of all trials, then over all of them: a period that is off by a quarter of its square over
-    the length of a trial is off by a quarter of itself at the end.
+    By least squares over the beginning of all trials, then over more of them: a period that is off by a quarter of its square
+    over a time is off by a quarter of itself at the end of that time.
     """
     if wheels.conditions.seen is None:
         return tuple((period,) for period in _ROUND)
     told, saw = np.stack([wheels.left_m_s, wheels.right_m_s]), seen_speeds(wheels)
-    longest_s = float(wheels.step_s.sum(axis=1).max(initial=0.0))
+    late_s = float(np.clip(wheels.step_s.sum(axis=1).max(initial=0.0), _EARLY_S, _LATE_S))
+    reach = 0.25 / _EARLY_S
 
     def explained(periods_s: Array, until_s: float) -> Array:
         return np.stack([explained_by_ticks(told, saw, wheels.step_s, periods_s, lag_s, until_s) for lag_s in _LAGS_S])
 
-    early = 1.0 / np.arange(1.0 / _LONGEST_S, 1.0 / _SHORTEST_S, 0.25 / _EARLY_S)
+    early = 1.0 / np.arange(1.0 / _LONGEST_S, 1.0 / _SHORTEST_S, reach)
     first = explained(early, _EARLY_S).max(axis=0)
     found = []
     for at in np.argsort(-first)[:_BEST]:
-        reach = 0.25 / _EARLY_S
-        near = 1.0 / np.arange(1.0 / early[at] - reach, 1.0 / early[at] + reach, _FINE / max(longest_s, _EARLY_S))
-        found.append(float(near[explained(near, np.inf).max(axis=0).argmax()]))
+        near = 1.0 / np.arange(1.0 / early[at] - reach, 1.0 / early[at] + reach, _FINE / late_s)
+        found.append(float(near[explained(near, late_s).max(axis=0).argmax()]))
     return tuple((period,) for period in (*_ROUND, *found))
 
 

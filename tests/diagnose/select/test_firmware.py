@@ -10,7 +10,7 @@ from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import fit_extended, fit_with, listed
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.physics.effects import command_rate, effect_named
-from bns.physics.signals import Wheels
+from bns.physics.signals import Conditions, Wheels
 from tests.diagnose.worlds import BASE_M, FRAME_S, NOMINAL, hidden, measured
 
 
@@ -135,6 +135,19 @@ def test_ticks_of_no_round_period_are_seen_before_any_fit(period_s, tau_s):
     assert min(abs(one - period_s) for (one,) in found) < 0.1 * period_s**2 / 9.0
     untracked = Wheels(np.full((1, 4), 0.1), np.ones((1, 4)), np.ones((1, 4)), BASE_M)
     assert effect_named("command-rate").starts_from(untracked) == tuple((one,) for one in command_rate._ROUND)
+
+
+def test_of_a_long_trial_only_the_beginning_is_looked_at(monkeypatch):
+    """Of twenty minutes as of half a minute: the work grows with the square of the time."""
+    asked = []
+    monkeypatch.setattr(command_rate, "explained_by_ticks", lambda *given: asked.append(given[3:]) or np.zeros(len(given[3])))
+    for steps in (600, 24_000):
+        still = np.zeros((1, steps))
+        seen = Conditions(seen=np.zeros((1, steps, 3)))
+        command_rate.starts_from(Wheels(np.full((1, steps), 0.05), still, still, BASE_M, seen))
+    short, long = asked[: len(asked) // 2], asked[len(asked) // 2 :]
+    assert [(len(periods), until_s) for periods, _, until_s in long] == [(len(periods), until_s) for periods, _, until_s in short]
+    assert {until_s for _, _, until_s in long} == {3.0, 30.0}
 
 
 @pytest.mark.slow
