@@ -200,7 +200,7 @@ class DiagnoseResult(Shown):
 
     def _documented(self, fit: Fit, errors: PairedErrors | None) -> Model:
         """The fitted model; effects of the user's own with their files, without which nobody could read them back."""
-        model = documented(fit, self.ready.model, self.ready.measured, errors)
+        model = documented(fit, self.ready.model, self.ready.measured, errors, self.ready.predictor)
         files = {n: {"file": str(Path(file).resolve())} for n, file in own_files(self.asked.get("also", ())).items()}
         if files:
             known = tuple(replace(a, written=files.get(a.effect.name, a.written)) for a in model.effects)

@@ -23,11 +23,13 @@ from bns.diagnose.estimate.problem import given_steps, problem_for
 from bns.diagnose.estimate.starts import fitting
 from bns.diagnose.parallel import one_thread_each
 from bns.diagnose.predict.base import Predictor, Steps
+from bns.diagnose.predict.jointed import JointedPredictor
 from bns.diagnose.predict.paired_errors import PairedErrors, PairedWindows
 from bns.errors import ModelError, in_both
 from bns.physics.effect import Effect
 from bns.physics.effects import effect_in_file
 from bns.physics.formula import formula_effect
+from bns.physics.jointed.model import JointedModel
 from bns.physics.model import ActiveEffect, Model
 
 
@@ -123,7 +125,7 @@ def add_effects(
     windows, fit = memory.windows or PairedWindows(predictor), judged[-1][1]
     errors = windows.errors(list(zip(names, steps, strict=True)))
     warnings = (*warnings_on(fit, effects, errors), *fitted_again(model, fit))
-    return ExtendedModel(fit, documented(fit, model, measured, errors), errors, warnings, steps)
+    return ExtendedModel(fit, documented(fit, model, measured, errors, predictor), errors, warnings, steps)
 
 
 def _judged(
@@ -193,7 +195,9 @@ def _written(model: Model, name: str, written: Mapping[str, str]) -> Model:
     )
 
 
-def documented(fit: Fit, before: Model, measured: Measured, errors: PairedErrors | None) -> Model:
+def documented(
+    fit: Fit, before: Model, measured: Measured, errors: PairedErrors | None, predictor: Predictor
+) -> Model:
     """The fitted model with intervals, reasons and provenance; errors of None: none are known."""
     reason = f"fitted to {len(measured.tracks)} trials of {measured.path.name} ({measured.digest})"
     effects = tuple(_with_interval(fit, active, reason) for active in fit.model.effects)
@@ -210,7 +214,10 @@ def documented(fit: Fit, before: Model, measured: Measured, errors: PairedErrors
         if errors
         else {},
     }
-    return replace(fit.model, effects=effects, provenance=provenance)
+    written = replace(fit.model, effects=effects, provenance=provenance)
+    if isinstance(written, JointedModel) and isinstance(predictor, JointedPredictor) and written.limited_by_set_points:
+        return written.by_set_points(predictor.told_rad_s)
+    return written
 
 
 def fitted_to(model: Model, digest: str) -> bool:

@@ -17,6 +17,7 @@ from bns.diagnose.effect_caveats import (
     on_longer,
     on_moved,
     on_place,
+    on_servo_speed,
     on_the_cone,
 )
 from bns.diagnose.estimate.cancelling import cancelled
@@ -89,6 +90,7 @@ def notes_on(
     yield from on_heading(found.seen_in_heading)
     yield from on_effects(selection, tracks, found.imitating, not (found.rest.any or found.terms))
     yield from single_wheel(found.terms[0].fit if _described(found) else selection.fit)  # the numbers that are shown
+    yield from on_servo_speed(selection)
     yield from on_the_cone(selection.fit.model)
     for names in longer:
         yield on_longer(selection, names)

@@ -14,6 +14,7 @@ from bns.diagnose.estimate.plausibility import known_together, with_unit
 from bns.diagnose.estimate.smoothing_tracker import LATE, smoothing_tracker
 from bns.diagnose.outcome import Outcome
 from bns.diagnose.predict.horizons import IN_WORDS
+from bns.diagnose.predict.jointed import JointedPredictor
 from bns.diagnose.residuals.grammar import SHIFTS
 from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.negligible import Shift
@@ -68,6 +69,17 @@ def on_effects(
         )
         if tracks.start_known:
             yield from _on_drift(per_trial_effect.effect.name, tracks.start_s, own)
+
+
+def on_servo_speed(selection: SelectionResult) -> Iterator[str]:
+    """What the limit of the servos' speed is in radians per second: a share alone nobody can measure."""
+    predictor, name = selection.problem.predictor, "servo-speed-limit"
+    if name in selection.accepted and isinstance(predictor, JointedPredictor):
+        told, share = predictor.told_rad_s, selection.fit.model.values_of(name)["share"]
+        yield (
+            f"{name}: set points move at up to {told:.3g} rad/s (over half a second), so the servos turn at up to "
+            f"{share * told:.3g} rad/s."
+        )
 
 
 def implausible_text(selection: SelectionResult, name: str) -> str:

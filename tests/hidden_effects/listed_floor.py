@@ -84,7 +84,7 @@ class QuadraticTurnSlip(Cause):
 
 @dataclass
 class CasterSwing(Cause):
-    """A caster half a wheelbase ahead drags while it points another way than its pivot moves; it turns with the way."""
+    """A caster whose hinge is half a wheelbase ahead drags while it points another way than its hinge moves; it trails."""
 
     loss: float
     trail_m: float
@@ -94,10 +94,15 @@ class CasterSwing(Cause):
         caster, out = np.zeros(len(wheels)), np.empty_like(wheels)
         for i in range(wheels.shape[1]):
             speed = np.abs(pivot[:, i])
-            off = np.angle(pivot[:, i] * np.exp(-1j * caster))
-            off = np.where(speed > 1e-3, off, 0.0)
-            out[:, i] = wheels[:, i] * (1 - self.loss * np.sin(off / 2) ** 2)[:, None]
-            caster = caster + off * np.minimum(speed * moment.step_s / self.trail_m, 1.0)
+            turn = np.where(speed > 1e-3, 2 * pivot[:, i].imag / BASE_M, 0.0)
+            kept = 0.0
+            for _ in range(FINE):
+                off = np.where(speed > 1e-3, np.angle(pivot[:, i] * np.exp(-1j * caster)), 0.0)
+                off = np.clip(off, 0.05 - np.pi, np.pi - 0.05)  # no floor is so even that it stays upside down
+                left = 1 - self.loss * np.sin(off / 2) ** 2
+                kept = kept + left / FINE
+                caster = caster + left * (speed * np.sin(off) / self.trail_m - turn) * moment.step_s / FINE
+            out[:, i] = wheels[:, i] * kept[:, None]
         return out
 
 

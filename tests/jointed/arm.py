@@ -47,11 +47,14 @@ def log(
     friction_n_m: tuple[float, ...] = (0.0, 0.0, 0.0),
     carried_kg: float = 0.0,
     finer: int = 1,
+    speed_rad_s: float = np.inf,
+    told_rad_s: float = np.inf,
 ) -> pd.DataFrame:
     """Random set points every 0.48 s, seen at 25 Hz; the elbow's zero may be off, its servo weak or of a lower gain.
 
     ``friction_n_m``: dry friction in each joint. ``carried_kg``: at the hand. ``finer``: with steps so many times shorter than
-    the model's, and another integrator.
+    the model's, and another integrator. ``speed_rad_s``: of the servos, which go from set point to set point no faster;
+    ``told_rad_s``: of the set points themselves.
     """
     rng, rows = np.random.default_rng(seed), []
     model = mujoco.MjModel.from_xml_string(loaded(xml(), "hand", carried_kg) if carried_kg else xml())
@@ -62,15 +65,17 @@ def log(
     if finer > 1:
         model.opt.timestep, model.opt.integrator = 0.004 / finer, mujoco.mjtIntegrator.mjINT_EULER
     for trial in range(trials):
-        data, goal = mujoco.MjData(model), np.zeros(3)
+        data, goal, told, follows = mujoco.MjData(model), np.zeros(3), np.zeros(3), np.zeros(3)
         for step in range(1500):
             if step % 120 == 0:
                 goal = rng.uniform(-1.2, 1.2, 3)
             if step % 10 == 0:
+                told = told + np.clip(goal - told, -10 * 0.004 * told_rad_s, 10 * 0.004 * told_rad_s)
                 mujoco.mj_kinematics(model, data)
                 seen = np.concatenate([data.site(name).xpos[:2] for name in ("elbow", "hand")])
-                rows.append((trial, step * 0.004, *goal, *(seen + noise_m * rng.normal(size=4))))
-            data.ctrl[:] = goal + np.array([0, zero_rad, 0])
+                rows.append((trial, step * 0.004, *told, *(seen + noise_m * rng.normal(size=4))))
+            follows = follows + np.clip(told - follows, -0.004 * speed_rad_s, 0.004 * speed_rad_s)
+            data.ctrl[:] = follows + np.array([0, zero_rad, 0])
             mujoco.mj_step(model, data, finer)
     columns = [*(f"{j}_set_rad" for j in JOINTS), *(f"{s}_{a}_m" for s in ("elbow", "hand") for a in "xy")]
     return pd.DataFrame(rows, columns=["trial", "t_s", *columns])

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.diagnose.estimate import profiles
+from bns.diagnose.estimate import fit_set, profiles
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.parameters import FreeParameter
 from bns.diagnose.estimate.profiles import _STEP, with_simulated_profiles
@@ -67,7 +67,7 @@ def plain_losses(monkeypatch):
 @pytest.mark.parametrize("began", [0.7, 0.74, 0.62, 0.9])
 def test_a_number_goes_where_simulations_are_best(began):
     body = Body()
-    found = with_simulated_profiles(body, fit_at(began))
+    found, _ = with_simulated_profiles(body, fit_at(began))
     assert found.values[0] == pytest.approx(BEST, rel=1e-3)
     assert 5 <= body.alone <= (7 if abs(share(began)) <= 2 * _STEP else 12)
     low, high = found.interval(0)
@@ -76,28 +76,59 @@ def test_a_number_goes_where_simulations_are_best(began):
     assert share(low) == pytest.approx(-share(high), rel=0.05)
 
 
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_profile_that_still_falls_leads_on_to_another_valley(side):
+    began = STIFFNESS.parameter.beside(BEST, side * 0.5)
+    found, lower = with_simulated_profiles(Body(), fit_at(began))
+    assert found.values[0] == began
+    assert not found.spans
+    assert share(STIFFNESS.of(lower)) == pytest.approx(side * (0.5 - 7 * _STEP), rel=1e-3)
+
+
+def test_a_profile_that_hardly_falls_leads_nowhere():
+    body = Body(flat=True)
+    body.per_trial = lambda losses: losses - 1e-6 * min(body.simulated)  # lower and lower, by less than rounding would be
+    assert with_simulated_profiles(body, fit_at(0.74))[1] is None
+
+
+@pytest.mark.parametrize("valleys", [0, 1, 2])
+def test_a_fit_goes_on_from_valley_to_valley_with_noise_settled_in_each(monkeypatch, valleys):
+    went, left = [], iter([SNAKE.with_effect("compliance", stiffness=0.5 - 0.1 * k) for k in range(valleys)])
+
+    def settled(_predictor, problem, fit):
+        went.append(STIFFNESS.of(fit.model))
+        return problem, fit
+
+    monkeypatch.setattr(fit_set, "with_simulated_profiles", lambda _problem, fit: (fit, next(left, None)))
+    monkeypatch.setattr(fit_set, "_settled", settled)
+    problem = SimpleNamespace(fit=lambda model: fit_at(STIFFNESS.of(model)))
+    _, found = fit_set._in_the_lowest_valley(None, problem, fit_at(0.9))
+    assert went == pytest.approx([0.5, 0.4][:valleys])
+    assert found.values[0] == pytest.approx([0.9, 0.5, 0.4][valleys])
+
+
 def test_ripples_move_the_number_little_and_widen_its_interval():
-    smooth, rough = (with_simulated_profiles(Body(ripple, own=0.005), fit_at(0.72)) for ripple in (0.0, 3.0))
+    smooth, rough = (with_simulated_profiles(Body(ripple, own=0.005), fit_at(0.72))[0] for ripple in (0.0, 3.0))
     width = [share(fit.interval(0)[1]) - share(fit.interval(0)[0]) for fit in (smooth, rough)]
     assert width[1] > 1.5 * width[0]
     assert rough.interval(0)[0] < BEST < rough.interval(0)[1]
 
 
 def test_an_interval_is_never_narrower_than_that_of_the_fit():
-    found = with_simulated_profiles(Body(own=1e-6), fit_at(0.7, se=0.02))
+    found, _ = with_simulated_profiles(Body(own=1e-6), fit_at(0.7, se=0.02))
     low, high = found.interval(0)
     assert high - low == pytest.approx(2 * 2.02 * 0.02, rel=0.05)
 
 
 def test_a_number_stays_where_nothing_tells_it():
     body = Body(flat=True)
-    found = with_simulated_profiles(body, fit_at(0.74))
+    found, _ = with_simulated_profiles(body, fit_at(0.74))
     assert found.values[0] == 0.74
     assert not found.spans
 
 
 def test_a_number_stays_where_the_loss_is_no_lower_at_the_parabolas_lowest_point():
-    found = with_simulated_profiles(Body(worse=True), fit_at(0.74))
+    found, _ = with_simulated_profiles(Body(worse=True), fit_at(0.74))
     assert found.values[0] == 0.74
     low, high = found.interval(0)
     assert low < 0.74 < high
@@ -116,7 +147,7 @@ def test_intervals_are_about_the_values_at_the_end(monkeypatch):
     body.fitted_at = lambda model: fit_of([number.of(model) for number in (east, north)], -abs(north.of(model)))
     monkeypatch.setattr(profiles, "_searched", lambda _problem, fit, j: (float(fit.values[j]) + 0.01 * j, 0.1))
     monkeypatch.setattr(profiles, "followed", lambda _problem, _fit, j: np.array([1.0, 1.0]) if j else np.array([1.0, 0.0]))
-    found = with_simulated_profiles(body, fit_of([0.02, 0.0], 0.0))
+    found, _ = with_simulated_profiles(body, fit_of([0.02, 0.0], 0.0))
     assert found.values.tolist() == pytest.approx([0.03, 0.01])
     for j, value in enumerate(found.values):
         low, high = found.interval(j)
@@ -128,7 +159,7 @@ def test_only_bodies_are_simulated_again():
     body = Body()
     body.predictor.luck = None
     fit = fit_at(0.74)
-    assert with_simulated_profiles(body, fit) is fit
+    assert with_simulated_profiles(body, fit) == (fit, None)
     assert not body.simulated
 
 
@@ -138,5 +169,5 @@ def test_numbers_that_need_no_simulation_stay():
     model = SNAKE.with_effect("camera-scale", **{camera.parameter.name: 0.02})
     fit = Fit(model, (camera,), np.array([0.02]), np.eye(1), zeros[:, 0], zeros[:, 0], zeros, np.zeros((TRIALS, 3, 1)))
     body = Body()
-    assert with_simulated_profiles(body, fit).values[0] == 0.02
+    assert with_simulated_profiles(body, fit)[0].values[0] == 0.02
     assert not body.simulated

@@ -84,8 +84,18 @@ def fit_set(
         other = problem.fit(known)
         if other.loss < fit.loss - BETTER:
             problem, fit = _settled(predictor, problem, other)
-    fit = with_simulated_profiles(problem, with_jagged(problem, fit))
+    problem, fit = _in_the_lowest_valley(predictor, problem, with_jagged(problem, fit))
     return problem, fit, tuple(effect.name for effect in order)
+
+
+def _in_the_lowest_valley(predictor: Predictor, problem: Problem, fit: Fit) -> tuple[Problem, Fit]:
+    """The fit of a body with its profiles simulated; noise and numbers anew, some times, where these lead to another valley."""
+    for _ in range(ROUNDS):
+        profiled, lower = with_simulated_profiles(problem, fit)
+        if lower is None:
+            return problem, profiled
+        problem, fit = _settled(predictor, problem, problem.fit(lower))
+    return problem, with_simulated_profiles(problem, fit)[0]
 
 
 def _begun_again(problem: Problem, fit: Fit, effects: Sequence[Effect]) -> Fit:

@@ -24,26 +24,31 @@ from bns.diagnose.estimate.parameters import FreeParameter, moved_by
 from bns.diagnose.estimate.significance import jackknife_covariance
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.jointed.pieced import PiecedEffect
+from bns.physics.model import Model
 
 _STEP = DEFAULTS.estimate.profile_step
 _POINTS = DEFAULTS.estimate.profile_points
 _FARTHEST = DEFAULTS.estimate.profile_farthest
+_BETTER = DEFAULTS.estimate.valley_better
 
 
-def with_simulated_profiles(problem: Problem, fit: Fit) -> Fit:
+def with_simulated_profiles(problem: Problem, fit: Fit) -> tuple[Fit, Model | None]:
     """The fit of a body with its numbers at the lowest points of their profiles, and with intervals from these.
 
     The same fit for every other robot. Numbers whose profile has no lowest point stay as they are, and so do those with which
-    the simulated loss is no lower there.
+    the simulated loss is no lower there. And None, or the model with a number as far off as it was simulated, where the loss is
+    lower and still falls: the fit ended in another valley, and what follows from it is worth nothing.
     """
     if problem.predictor.luck is None:
-        return fit
+        return fit, None
     effects = {active.effect.name: active.effect for active in fit.model.at("mechanics")}
     halves: dict[int, float] = {}
     for j, number in enumerate(fit.free):  # each at its best, given the best values of those before
         simulated = number.effect in effects and not isinstance(effects[number.effect], PiecedEffect)
         if simulated and np.isfinite(number.parameter.plausible).all():
             found = _searched(problem, fit, j)
+            if isinstance(found, float):
+                return fit, moved_by(fit.model, fit.free, (found - fit.values[j]) * followed(problem, fit, j))
             if found is not None:
                 value, halves[j] = found
                 way = (value - fit.values[j]) * followed(problem, fit, j)
@@ -51,15 +56,19 @@ def with_simulated_profiles(problem: Problem, fit: Fit) -> Fit:
                 problem.predictor.anchor(moved)
                 there = problem.fitted_at(moved)
                 fit = there if there.loss < fit.loss else fit
-    return replace(fit, spans={j: _around(fit.free[j], float(fit.values[j]), half) for j, half in halves.items()})
+    spans = {j: _around(fit.free[j], float(fit.values[j]), half) for j, half in halves.items()}
+    return replace(fit, spans=spans), None
 
 
 def _around(number: FreeParameter, value: float, half: float) -> tuple[float, float]:
     return number.parameter.beside(value, -half), number.parameter.beside(value, half)
 
 
-def _searched(problem: Problem, fit: Fit, j: int) -> tuple[float, float] | None:
-    """The lowest point of a number's profile, and half of its 95 % interval as a share of the plausible range; None: no such."""
+def _searched(problem: Problem, fit: Fit, j: int) -> tuple[float, float] | float | None:
+    """The lowest point of a number's profile, and half of its 95 % interval as a share of the plausible range; None: no such.
+
+    A value alone: where the profile, simulated as far as it may be, still falls.
+    """
     number, value = fit.free[j], float(fit.values[j])
     p, way = number.parameter, followed(problem, fit, j)
     step = max(_STEP, _share_of(number, value, fit.se(j)))
@@ -78,6 +87,8 @@ def _searched(problem: Problem, fit: Fit, j: int) -> tuple[float, float] | None:
         at(round(beyond / step) + int(np.sign(beyond)))
         if len(losses) == known:
             break
+    if (end := _still_falling(losses)) is not None:
+        return p.beside(value, end)
     lowest = _lowest(losses)
     if lowest is None:
         return None
@@ -108,6 +119,14 @@ def _outermost(losses: Mapping[float, Array]) -> float | None:
     if 2 <= best < len(shares) - 2:
         return None
     return shares[0] if best < 2 else shares[-1]
+
+
+def _still_falling(losses: Mapping[float, Array]) -> float | None:
+    """The end (share) at which the loss is the least of all, and lower than where the number is now; None: it is at neither."""
+    totals = {share: float(of.sum()) for share, of in losses.items()}
+    least = min(totals, key=lambda share: totals[share])
+    falls = least in (min(totals), max(totals)) and totals[least] < totals[0.0] - _BETTER
+    return least if falls else None
 
 
 def _lowest(losses: Mapping[float, Array]) -> tuple[float, float] | None:

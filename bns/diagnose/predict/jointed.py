@@ -165,6 +165,11 @@ class JointedPredictor:
         return isinstance(model, JointedModel) and model.mechanism == self._bare.mechanism
 
     @property
+    def told_rad_s(self) -> float:
+        """The fastest that servos are told to move: what the limit of their speed is a share of."""
+        return self._simulations.told_rad_s
+
+    @property
     def sites(self) -> tuple[str, ...]:
         """Names of the tracked sites."""
         return self._bare.mechanism.sites

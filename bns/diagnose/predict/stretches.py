@@ -165,6 +165,11 @@ class Simulations:
         """The plant with nothing wrong."""
         return self._body.plant
 
+    @property
+    def told_rad_s(self) -> float:
+        """The fastest that servos are told to move: the speed limit of one is a share of it."""
+        return self._body.fine.simulator.told_rad_s
+
     def at(self, points_m: Array, since_s: Array) -> Array:
         """Points (frames, sites, 2) that were looked at (looks, sites, 2), at times since_s (frames,) of their stretches."""
         stretch = self.tracks.stretch

@@ -66,10 +66,13 @@ def _looks(first: int, last: int, looks: int) -> NDArray[np.int64]:
 
 
 def told_speed_rad_s(drives: Sequence[Drive], dt_s: float) -> float:
-    """The fastest that set points move over a twentieth of a second, but for the quickest hundredth."""
+    """The fastest that set points move over half a second, but for the quickest hundredth.
+
+    Set points may jump: over a shorter time, a jump is as fast as the time is short.
+    """
     k = max(round(_OVER_S / dt_s), 1)
     ways = [np.abs(d.set_points[k:] - d.set_points[:-k]).max(axis=1) for d in drives if len(d.set_points) > k]
     return float(np.quantile(np.concatenate(ways), 0.99)) / (k * dt_s) if ways else 0.0
 
 
-_OVER_S = 0.05
+_OVER_S = 0.5

@@ -34,7 +34,7 @@ class Mechanism:
     ``xml``: MJCF with position servos; ``sites``: names of the tracked sites. A servo within ``dead_band_rad`` of where it is
     told to be does nothing, and follows ``delay_s`` late. ``tether``: the link that ``tether_drag_n`` brakes ("": the root).
     ``joint_speed_rad_s``, ``settle_s``, ``resolution_rad``: of a robot that goes from posture to posture, how (0: it is told
-    positions at times).
+    positions at times). ``fastest_set_point_rad_s``: what a servo's speed limit is a share of (0: of the set points at hand).
     """
 
     xml: str
@@ -46,11 +46,15 @@ class Mechanism:
     joint_speed_rad_s: float = 0.0
     settle_s: float = 0.0
     resolution_rad: float = 0.0
+    fastest_set_point_rad_s: float = 0.0
 
     @property
     def sha256(self) -> str:
-        """Of everything in it, 64 digits."""
-        return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()
+        """Of everything in it, 64 digits; of what came in later, where it is given."""
+        of = asdict(self)
+        if not self.fastest_set_point_rad_s:
+            del of["fastest_set_point_rad_s"]
+        return hashlib.sha256(json.dumps(of, sort_keys=True).encode()).hexdigest()
 
 
 @dataclass(frozen=True)

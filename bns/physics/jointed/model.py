@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
+
+import numpy as np
 
 from bns.errors import ModelError, unknown_name
 from bns.physics.effect import REFERENCE_WHEELBASE_M, Effect
@@ -65,3 +67,17 @@ class JointedModel(Model):
     def written_base(self) -> dict[str, Any]:
         """How the model file names the body."""
         return {"base": self.base, **self.written}
+
+    @property
+    def limited_by_set_points(self) -> bool:
+        """Has it a limit of its servos' speed that is a share of how fast the set points at hand move?
+
+        Not where the speed is known, nor of a robot whose servos are all told to move at the same one.
+        """
+        known = self.mechanism.fastest_set_point_rad_s or self.mechanism.joint_speed_rad_s
+        return not known and bool(np.isfinite(self.plant.speed).any())
+
+    def by_set_points(self, fastest_rad_s: float) -> JointedModel:
+        """The model with its servos' limit as a share of this speed, so that it is the same for other set points."""
+        mechanism = replace(self.mechanism, fastest_set_point_rad_s=fastest_rad_s)
+        return replace(self, mechanism=mechanism, written={**self.written, "fastest_set_point_rad_s": fastest_rad_s})

@@ -18,8 +18,8 @@ from bns.safe_yaml import Lines, shown, text_of
 
 SNAKE = "snake"
 ENDING = ".xml"
-NUMBERS = ("dead_band_rad", "delay_s", "tether_drag_n")
-"""What a model file may say of servos and tether, and MJCF does not know."""
+NUMBERS = {"dead_band_rad": 10.0, "delay_s": 10.0, "tether_drag_n": 10.0, "fastest_set_point_rad_s": 1e4}
+"""What a model file may say of servos and tether, and MJCF does not know: the largest value of each."""
 _TOP = ("base", "body", "parameters", "sites", "tether", *NUMBERS, "effects", "provenance")
 
 
@@ -109,7 +109,7 @@ def _of_mjcf(path: Path, settings: Mapping[str, Any], name: str) -> JointedModel
     twice = sorted({str(site) for site in sites if list(sites).count(site) > 1})
     if twice:
         raise ModelError(f"model {name}: sites has {', '.join(twice)} more than once; name each tracked site once.")
-    numbers = {key: number(f"model {name}: {key}", settings.get(key, 0.0), 0.0, 10.0) for key in NUMBERS}
+    numbers = {key: number(f"model {name}: {key}", settings.get(key, 0.0), 0.0, most) for key, most in NUMBERS.items()}
     tether = str(settings.get("tether", ""))
     mechanism = Mechanism(xml, tuple(map(str, sites)), tether=tether, **numbers)
     written = {"body": str(path.resolve()), "sites": list(mechanism.sites), "tether": tether, **numbers}

@@ -51,7 +51,7 @@ class Rest:
 class Simulator:
     """Drives of one mechanism. Rows are simulated longest first, so that those that go on stand together.
 
-    ``told_rad_s``: the fastest that servos are told to move; where it is not given, in these drives.
+    ``told_rad_s``: the fastest that servos are told to move; where neither it nor the mechanism's is given, in these drives.
     """
 
     def __init__(
@@ -62,7 +62,9 @@ class Simulator:
         self._lasts = np.array([int(d.frames[-1]) for d in drives])
         self._order = np.argsort(-self._lasts, kind="stable")
         self._dt_s = float(machine.model.opt.timestep)
-        self._told_rad_s = told_speed_rad_s(drives, self._dt_s) if told_rad_s is None else told_rad_s
+        known = machine.mechanism.fastest_set_point_rad_s or machine.mechanism.joint_speed_rad_s or told_rad_s
+        self.told_rad_s = told_speed_rad_s(drives, self._dt_s) if known is None else known
+        """What the speed limit of a servo is a share of."""
         self.counts = np.array([len(d.frames) for d in drives])
         self.simulated = 0
         """Rows simulated so far."""
@@ -71,7 +73,7 @@ class Simulator:
 
     def only(self, chosen: NDArray[np.int64]) -> Simulator:
         """Some of the drives, by servos as fast as those of all."""
-        return Simulator(self.machine, [self.drives[i] for i in chosen], self._threads, self._told_rad_s)
+        return Simulator(self.machine, [self.drives[i] for i in chosen], self._threads, self.told_rad_s)
 
     def at_rest(self) -> Rest:
         """Every body come to rest in the first posture of its drive; then driven once for where it is first seen."""
@@ -146,7 +148,7 @@ class Simulator:
         order, lasts = self._order, self._lasts[self._order]
         self.simulated += len(order)
         state = np.ascontiguousarray(rest.state[order])
-        servos = _Servos(machine, plant, [self.drives[i].set_points for i in order], self._dt_s, self._told_rad_s)
+        servos = _Servos(machine, plant, [self.drives[i].set_points for i in order], self._dt_s, self.told_rad_s)
         floor = _Outside(machine, plant, rest.only(order))
         spec = mujoco.mjtState.mjSTATE_CTRL.value | mujoco.mjtState.mjSTATE_XFRC_APPLIED.value
         control = np.zeros((len(order), 1, mujoco.mj_stateSize(model, spec)))

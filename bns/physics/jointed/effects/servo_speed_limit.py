@@ -9,7 +9,7 @@ from bns.physics.jointed.plant import Plant
 
 
 def apply(plant: Plant, share: float) -> Plant:
-    """The speed limit of every joint lowered to a fraction of its fastest commanded speed."""
+    """The speed limit of every joint lowered to a fraction of the fastest commanded speed of any (`told_speed_rad_s`)."""
     return replace(plant, speed=plant.speed.clip(max=share))
 
 
@@ -18,7 +18,7 @@ EFFECT = Effect(
     stage="mechanics",
     parameters=(
         Parameter(
-            "share", "1", 0.1, 1.0, (0.3, 1.0), 1.0, "highest speed of a servo, as a fraction of its fastest commanded speed"
+            "share", "1", 0.02, 1.0, (0.15, 1.0), 1.0, "highest speed of a servo, as a fraction of the fastest commanded speed"
         ),
     ),
     equation="|d set point / dt| <= share * fastest commanded",
@@ -26,6 +26,6 @@ EFFECT = Effect(
     lookalikes=("torque-limit", "servo-delay", "compliance"),
     sentence="the servos turn more slowly than commanded",
     measurement="let one servo turn freely from end to end and measure the time",
-    starts=((0.79,), (0.49,), (0.3,)),
+    starts=((0.79,), (0.49,), (0.3,), (0.19,)),
     apply=apply,
 )
