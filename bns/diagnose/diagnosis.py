@@ -13,7 +13,7 @@ from bns.diagnose.estimate.smoothing_tracker import LATE
 from bns.diagnose.predict.paired_errors import PairedErrors, noise_json, plain
 from bns.diagnose.residuals.along_variables import ResidualDependence
 from bns.diagnose.residuals.grammar import PAST
-from bns.diagnose.residuals.outliers import one_wheel
+from bns.diagnose.residuals.outliers import one_wheel, what_they_did
 from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.residuals.unexplained import NOTHING, Unexplained
 from bns.diagnose.residuals.worst_trials import WithoutWorst
@@ -139,7 +139,8 @@ class Diagnosis:
         what = often if len(moments) >= OFTEN * trials else "the error is large for a moment"
         worst = f"in {len(moments)} of {trials} trials {what}; the worst is {moments[0].in_words}"
         share = self.rest.shared or self.rest.place
-        return tuple(filter(None, (*scattered, worst, one_wheel(moments), share.in_words if share is not None else "")))
+        shared = share.in_words if share is not None else ""
+        return tuple(filter(None, (*scattered, worst, what_they_did(moments), one_wheel(moments), shared)))
 
     @property
     def numbers(self) -> dict[str, dict[str, dict[str, Any]]]:

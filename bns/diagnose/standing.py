@@ -10,6 +10,7 @@ from scipy.special import stdtrit
 from bns.diagnose.estimate.cross_validation import Judged, judged_errors
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.fit_set import fit_set
+from bns.diagnose.estimate.plausibility import does_nothing
 from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.paired_errors import PairedErrors
@@ -61,14 +62,16 @@ def standing_of(
 
 
 def least_certain(selection: SelectionResult) -> str:
-    """The accepted effect of a body that is the farthest from certain where the body is simulated itself; "" if all are certain.
+    """The accepted effect that is the farthest from certain once all numbers are fitted together; "" if all are certain.
 
-    A search reads from curves what an effect gains. They miss the small valleys of the loss, which the last step of a fit knows
-    of (`estimate/profiles.py`): there, too, one number at least must be told from neutral at the level that a search asks for.
+    Of a robot on wheels: one of which no number can be told from neutral. A few bad moments can earn it a place. Of a body, where
+    this is simulated itself: a search reads from curves what an effect gains. They miss the small valleys of the loss, which the
+    last step of a fit knows of (`estimate/profiles.py`): there, too, one number at least must be told from neutral at the level
+    that a search asks for.
     """
     fit, step = selection.fit, selection.steps[0] if selection.steps else None
     if selection.problem.predictor.luck is None or step is None:
-        return ""
+        return next((name for name in reversed(selection.accepted) if does_nothing(fit, name)), "")
     freedom = max(len(fit.losses) - len(fit.free), 1)
     level = FALSE_ALARM / step.candidates
     needed = float(stdtrit(freedom, 1.0 - level / 2.0) / stdtrit(freedom, 0.975))

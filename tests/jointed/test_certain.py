@@ -80,7 +80,17 @@ def test_of_a_hundred_that_were_tried_one_must_be_told_from_neutral_a_hundred_ti
 
 def test_only_numbers_for_which_the_body_was_simulated_are_asked():
     assert least_certain(found(joint10=(0.02, None))) == ""
-    assert least_certain(found(luck=None, joint10=(0.02, 0.019))) == ""
+
+
+def test_of_wheels_what_cannot_be_told_from_neutral_goes_the_last_first(monkeypatch):
+    """The interval alone counts, as it is shown."""
+    searched = found(luck=None, joint2=(0.02, None), joint7=(0.02, None), joint10=(0.02, None))
+    monkeypatch.setattr(standing, "does_nothing", lambda _fit, name: name != "joint-zero-joint10")
+    assert least_certain(searched) == "joint-zero-joint7"
+    monkeypatch.undo()
+    assert least_certain(searched) == "joint-zero-joint10"  # 0.02 with a standard error of 1
+    surer = replace(searched, fit=replace(searched.fit, covariance=1e-6 * np.eye(3)))
+    assert least_certain(surer) == ""
 
 
 def test_one_number_that_is_certain_is_enough():

@@ -4,7 +4,9 @@ Poses of a robot that rests, after commands of zero, scatter by the tracker's no
 included; those in which it still coasts are left out (`rests`). A robot that creeps instead, down a slope for example, leaves a
 line, about which they scatter. While it drives under one command, a parabola through a few frames follows it and the rest is
 noise, white noise at least: slow noise follows the parabola, so this is a lower bound where the robot never rests. Where few
-poses at rest scatter as those while it drives, within what so few can tell, the many are taken: they are known better.
+poses at rest scatter as those while it drives, within what so few can tell, the many are taken: they are known better. Poses
+that are rounded stay the same at rest, however far they are rounded: noise is at least that of rounding, the grid over the root
+of twelve.
 """
 
 from __future__ import annotations
@@ -25,7 +27,9 @@ WIDTH = DEFAULTS.data.parabola_frames
 ORDER = DEFAULTS.data.parabola_order
 SLOWEST_HZ = DEFAULTS.data.parabola_slowest_hz
 AGREES = DEFAULTS.data.rest_agrees
-_AT_REST, _DRIVING, _BOTH = "at rest", "high frequency", "at rest, high frequency"
+_FEWEST_STEPS = DEFAULTS.data.grid_fewest
+_GRID_EXACT = DEFAULTS.data.grid_exact
+_AT_REST, _DRIVING, _BOTH, _ROUNDED = "at rest", "high frequency", "at rest, high frequency", "rounding"
 _SE = DEFAULTS.data.trimmed_sd_se
 
 
@@ -33,7 +37,7 @@ _SE = DEFAULTS.data.trimmed_sd_se
 class TrackingNoise:
     """Standard deviation of one tracked pose: each of x and y (m), and the heading (rad).
 
-    ``basis``: at rest; high frequency; both, where they agree; or distances between tracked points.
+    ``basis``: at rest; high frequency; both, where they agree; rounding; or distances between tracked points.
     """
 
     position_m: float
@@ -59,10 +63,35 @@ def tracking_noise(tracks: Tracks) -> TrackingNoise | None:
     if not (tracks.left_m_s.any() or tracks.right_m_s.any()):
         return None  # no wheels, or a robot that was never told to move
     resting, driving = noise_at_rest(tracks), _high_frequency(tracks)
-    if resting is None or driving is None:
-        return driving if resting is None else resting[0]
-    noise, freedom = resting
-    return replace(driving, basis=_BOTH) if _agree(noise, driving, freedom) else noise
+    if resting is not None and driving is not None:
+        noise, freedom = resting
+        noise = replace(driving, basis=_BOTH) if _agree(noise, driving, freedom) else noise
+    else:
+        found = driving if resting is None else resting[0]
+        if found is None:
+            return None
+        noise = found
+    position_m, heading_rad = rounding(tracks.pose[:, :2]), rounding(tracks.pose[:, 2:])
+    basis = _ROUNDED if position_m > noise.position_m else noise.basis
+    return TrackingNoise(max(noise.position_m, position_m), max(noise.heading_rad, heading_rad), basis)
+
+
+def rounding(values: Array) -> float:
+    """The standard deviation of rounding, where all values of each column are multiples of a step; the columns' mean square."""
+    return float(np.sqrt(np.mean([_grid(column) ** 2 for column in values.T]) / 12.0))
+
+
+def _grid(values: Array) -> float:
+    """The step of which all values are multiples, within a part of it; 0 where there is none."""
+    each = np.unique(values)
+    if len(each) < _FEWEST_STEPS:
+        return 0.0
+    apart = np.diff(each)
+    wide = apart > apart.max() * 1e-9
+    steps = np.round(apart / apart[wide].min())
+    at = np.append(0.0, np.cumsum(steps))
+    step, begin = np.polyfit(at, each, 1)
+    return float(step) if np.abs(each - begin - step * at).max() < _GRID_EXACT * step else 0.0
 
 
 def noise_at_rest(tracks: Tracks) -> tuple[TrackingNoise, int] | None:

@@ -41,6 +41,7 @@ _OF_NOISE = {
     "at rest": "poses at rest",
     "high frequency": "poses at high frequency",
     "at rest, high frequency": "poses at high frequency; those at rest scatter alike",
+    "rounding": "how far they are rounded",
 }
 _SHOWN = DEFAULTS.report.rows
 _WIDTH = DEFAULTS.report.formula_width

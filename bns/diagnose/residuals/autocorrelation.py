@@ -67,7 +67,7 @@ class Autocorrelation:
             return f"{motion} {swings} ({seen} {after}): {cause}."
         if self.correlation < 0:
             return f"{motion} is opposite {after} ({seen}): something swings back that no logged variable shows."
-        return f"{motion} is alike {after} ({seen}): something oscillates or drifts that no logged variable shows."
+        return f"{motion} is alike {after} ({seen}): what causes it lasts or comes again, and no logged variable shows it."
 
     @property
     def significant(self) -> bool:

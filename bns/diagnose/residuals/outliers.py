@@ -36,7 +36,11 @@ WAYS = DEFAULTS.residuals.fault_ways
 TURN = DEFAULTS.residuals.fault_turn
 ALONE = DEFAULTS.residuals.outlier_alone
 CHANCE = DEFAULTS.residuals.chance
+STILL = DEFAULTS.residuals.outlier_still
+LIKE_BEFORE = DEFAULTS.residuals.outlier_like_before
+MOSTLY = DEFAULTS.residuals.outlier_mostly
 _CLIP = DEFAULTS.residuals.clip
+STOOD, LATE = "stood still", "did what it had been told shortly before"
 
 
 @dataclass(frozen=True)
@@ -64,6 +68,8 @@ class Outlier:
     left_m: float = 0.0
     right_m: float = 0.0
     """How much farther each wheel came than predicted, in the direction in which it was predicted to turn; less is negative."""
+    did: str = ""
+    """`STOOD`, or `LATE`; "" if neither."""
 
     @property
     def in_words(self) -> str:
@@ -140,18 +146,48 @@ def moment_at(problem: Problem, fit: Fit, start: int, size: float) -> Outlier:
     every, strayed = ways(problem, fit, np.full(len(ends), begin), ends)
     driven, off = every[-1], strayed[-1]
     half_m = getattr(fit.model, "wheelbase_m", 0.0) / 2  # of a body on joints: no wheels
-    wheels = (float(np.sign(driven[0] + side * driven[2]) * (off[0] + side * off[2])) for side in (-half_m, half_m))
+    wheels = [np.sign(driven[0] + side * driven[2]) * (off[0] + side * off[2]) for side in (-half_m, half_m)]
     way, turned = np.hypot(*(driven + off)[:2]), driven[2] + off[2]
     x, y, _ = tracks.pose[begin]
     return Outlier(
         tracks.names[int(tracks.trial[start])],
         float(tracks.own_s[start]),
         size,
-        float(tracks.own_s[end] - tracks.own_s[begin]),
-        *(float(v) for v in (x, y, way, turned, np.hypot(*driven[:2]), driven[2])),
-        *(float(v) for v in (np.hypot(*strayed.T[:2]).max(), np.hypot(*off[:2]))),
-        *wheels,
+        lasted_s=float(tracks.own_s[end] - tracks.own_s[begin]),
+        x_m=float(x),
+        y_m=float(y),
+        moved_m=float(way),
+        turned_rad=float(turned),
+        predicted_m=float(np.hypot(*driven[:2])),
+        predicted_rad=float(driven[2]),
+        strayed_m=float(np.hypot(*strayed.T[:2]).max()),
+        ended_m=float(np.hypot(*off[:2])),
+        left_m=float(wheels[0]),
+        right_m=float(wheels[1]),
+        did=_did(problem, fit, begin, end, half_m),
     )
+
+
+def _did(problem: Problem, fit: Fit, begin: int, end: int, half_m: float) -> str:
+    """What the robot did from frame ``begin`` to ``end``: nothing, or what the model says of a window a little earlier."""
+    tracks, sizes = problem.predictor.tracks, np.array([1.0, 1.0, half_m])
+    back = np.arange(min(WIDTH, begin - int(tracks.first[tracks.trial[begin]])) + 1)
+    predicted, off = ways(problem, fit, begin - back, end - back)
+    moved = predicted[0] + off[0]
+    if np.linalg.norm(moved * sizes) < STILL * np.linalg.norm(predicted[0] * sizes):
+        return STOOD
+    missed = np.linalg.norm((predicted - moved) * sizes, axis=1)
+    return LATE if missed.min() < LIKE_BEFORE * missed[0] else ""
+
+
+def what_they_did(moments: Sequence[Outlier]) -> str:
+    """What the robot did in most of them, in a clause; "" where it did this and that."""
+    stood, late = (sum(moment.did in kinds for moment in moments) for kinds in ({STOOD}, {STOOD, LATE}))
+    if stood >= MOSTLY * len(moments):
+        return f"in {stood} of these {len(moments)} moments the robot {STOOD}, whatever it was told"
+    if late >= MOSTLY * len(moments):
+        return f"in {late} of these {len(moments)} moments the robot {LATE}, or stood still: commands come late, or are lost"
+    return ""
 
 
 def one_wheel(moments: Sequence[Outlier]) -> str:

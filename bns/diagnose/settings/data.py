@@ -97,6 +97,15 @@ class Data(Bodies, Guesses, Checks, Gaps, Stamps):
         "comes of more poses: 30 poses at rest know the noise to 13 % only. Of 1000 logs with the same noise in both, 3 differ "
         "by more.",
     )
+    grid_exact: float = setting(
+        0.1,
+        "1",
+        "Poses count as rounded to multiples of a step if none is further from one than this fraction of the step. Poses that "
+        "are not are on average a quarter of a step away.",
+    )
+    grid_fewest: int = setting(
+        20, "values", "At least so many different values show whether poses are rounded: of a few, any are multiples of a step."
+    )
     noise_trimmed: float = setting(
         3.0,
         "standard deviations",

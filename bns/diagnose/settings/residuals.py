@@ -252,6 +252,23 @@ class Residuals(CommandTimes):
         "In a moment that stands out one wheel alone is said not to turn as predicted if the other one is off by less than this "
         f"share of what it is off by; {BY_HAND}.",
     )
+    outlier_still: float = setting(
+        0.2,
+        "1",
+        "In a moment that stands out the robot is said to have stood still if it moved by less than this fraction of what was "
+        f"predicted; {BY_HAND}.",
+    )
+    outlier_like_before: float = setting(
+        0.5,
+        "1",
+        "It is said to have done what it had been told shortly before if what is predicted of a window up to as many frames "
+        f"earlier is off by less than this fraction of the model's error; {BY_HAND}.",
+    )
+    outlier_mostly: float = setting(
+        2 / 3,
+        "1",
+        f"Either is said where it is so in at least this fraction of the moments, the worst of each trial; {BY_HAND}.",
+    )
     outlier_trials: int = setting(
         3,
         "trials",

@@ -1,5 +1,6 @@
 """Noise of tracks from few poses at rest and many in motion. The motion is written here: arcs whose speed changes smoothly."""
 
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -100,3 +101,32 @@ def test_the_noise_is_known_from_fewer_numbers_than_the_median_needs_and_faults_
     assert trimmed_sd(faulty) == pytest.approx(1.0, abs=0.01)
     assert robust_sd(faulty) > 1.03
     assert trimmed_sd(np.zeros(5)) == 0.0
+
+
+@pytest.mark.parametrize("grid_m", [0.004, 0.012])
+def test_poses_that_are_rounded_are_off_by_the_rounding_where_they_do_not_change_at_rest(grid_m, monkeypatch):
+    """In degrees by halves, written in radians with five digits."""
+    monkeypatch.setattr(sys.modules[__name__], "NOISE", np.array([1e-5, 1e-5, 1e-5]))
+    tracks = driven(np.random.default_rng(5), rests_s=3.0)
+    tracks.pose[:, :2] = grid_m * np.round(tracks.pose[:, :2] / grid_m)
+    tracks.pose[:, 2] = np.round(np.radians(0.5 * np.round(np.degrees(tracks.pose[:, 2]) / 0.5)), 5)
+    assert noise_at_rest(tracks)[0].position_m < 1e-9
+    found = tracking_noise(tracks)
+    assert found.position_m == pytest.approx(grid_m / np.sqrt(12))
+    assert found.heading_rad == pytest.approx(np.radians(0.5) / np.sqrt(12), rel=1e-3)
+    assert found.basis == "rounding"
+
+
+def test_a_fine_grid_and_none_leave_the_noise_as_it_is():
+    tracks = driven(np.random.default_rng(6), rests_s=3.0)
+    noise = tracking_noise(tracks)
+    assert module.rounding(tracks.pose) == 0.0
+    tracks.pose[:, :2] = np.round(tracks.pose[:, :2], 4)
+    assert tracking_noise(tracks).position_m == pytest.approx(noise.position_m, rel=0.01)
+    assert tracking_noise(tracks).basis == noise.basis
+
+
+@pytest.mark.parametrize("several", [19, 20])
+def test_few_values_are_no_grid(several):
+    values = np.arange(several)[:, None] * 0.01
+    assert module.rounding(values) == (pytest.approx(0.01 / np.sqrt(12)) if several == 20 else 0.0)
