@@ -56,22 +56,31 @@ def standing_of(
     while withdraw and selection.accepted and not errors.falls:
         selection, errors = _without_the_worst(selection, predictor, given)
     withdrawn = tuple(name for name in searched if name not in selection.accepted)
+    while neutral := may_be_neutral(selection):
+        selection = refitted(selection.lacking((neutral,)), predictor, given)
+        errors = errors_before_and_after(selection, given)
     tick("what is left")
     dependence = residual_dependence(selection.problem, selection.fit)
     return Standing(selection, errors, withdrawn, dependence, unexplained(selection.problem, selection.fit, dependence))
 
 
-def least_certain(selection: SelectionResult) -> str:
-    """The accepted effect that is the farthest from certain once all numbers are fitted together; "" if all are certain.
+def may_be_neutral(selection: SelectionResult) -> str:
+    """The last accepted effect of which no number can be told from neutral once all are fitted together; "" if there is none.
 
-    Of a robot on wheels: one of which no number can be told from neutral. A few bad moments can earn it a place. Of a body, where
-    this is simulated itself: a search reads from curves what an effect gains. They miss the small valleys of the loss, which the
-    last step of a fit knows of (`estimate/profiles.py`): there, too, one number at least must be told from neutral at the level
-    that a search asks for.
+    A few bad moments can earn one a place.
+    """
+    return next((name for name in reversed(selection.accepted) if does_nothing(selection.fit, name)), "")
+
+
+def least_certain(selection: SelectionResult) -> str:
+    """The accepted effect of a body that is the farthest from certain where the body is simulated itself; "" if all are certain.
+
+    A search reads from curves what an effect gains. They miss the small valleys of the loss, which the last step of a fit knows
+    of (`estimate/profiles.py`): there, too, one number at least must be told from neutral at the level that a search asks for.
     """
     fit, step = selection.fit, selection.steps[0] if selection.steps else None
     if selection.problem.predictor.luck is None or step is None:
-        return next((name for name in reversed(selection.accepted) if does_nothing(fit, name)), "")
+        return ""
     freedom = max(len(fit.losses) - len(fit.free), 1)
     level = FALSE_ALARM / step.candidates
     needed = float(stdtrit(freedom, 1.0 - level / 2.0) / stdtrit(freedom, 0.975))

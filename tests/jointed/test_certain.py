@@ -10,7 +10,7 @@ from bns.diagnose import standing
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.parameters import FreeParameter
 from bns.diagnose.select.result import SelectionResult, SelectionStep
-from bns.diagnose.standing import least_certain
+from bns.diagnose.standing import least_certain, may_be_neutral
 from bns.physics.jointed.model_files import load_body
 
 SNAKE = load_body("snake")
@@ -56,6 +56,7 @@ def test_where_the_error_may_not_fall_the_best_alone_are_simulated(monkeypatch, 
     ranking = tuple(SimpleNamespace(name=name, rejected_because="absurd" if name == "payload" else "") for name in names)
     monkeypatch.setattr(SelectionResult, "withdrawn", lambda self: replace(self, accepted=()))
     monkeypatch.setattr(standing, "least_certain", lambda _: "")
+    monkeypatch.setattr(standing, "may_be_neutral", lambda _: "")
     monkeypatch.setattr(standing, "refitted", lambda selection, *_: selection)
     monkeypatch.setattr(standing, "explained_by", lambda selection, accepted: replace(selection, accepted=accepted))
     monkeypatch.setattr(
@@ -82,15 +83,31 @@ def test_only_numbers_for_which_the_body_was_simulated_are_asked():
     assert least_certain(found(joint10=(0.02, None))) == ""
 
 
-def test_of_wheels_what_cannot_be_told_from_neutral_goes_the_last_first(monkeypatch):
-    """The interval alone counts, as it is shown."""
+def test_what_cannot_be_told_from_neutral_is_found_the_last_first(monkeypatch):
     searched = found(luck=None, joint2=(0.02, None), joint7=(0.02, None), joint10=(0.02, None))
+    assert may_be_neutral(searched) == "joint-zero-joint10"  # 0.02 with a standard error of 1
+    assert may_be_neutral(replace(searched, fit=replace(searched.fit, covariance=1e-6 * np.eye(3)))) == ""
     monkeypatch.setattr(standing, "does_nothing", lambda _fit, name: name != "joint-zero-joint10")
-    assert least_certain(searched) == "joint-zero-joint7"
-    monkeypatch.undo()
-    assert least_certain(searched) == "joint-zero-joint10"  # 0.02 with a standard error of 1
-    surer = replace(searched, fit=replace(searched.fit, covariance=1e-6 * np.eye(3)))
-    assert least_certain(surer) == ""
+    assert may_be_neutral(searched) == "joint-zero-joint7"
+
+
+def test_what_cannot_be_told_from_neutral_does_not_stand(monkeypatch):
+    left = iter(["yaw-bias", "wheelbase", ""])
+    monkeypatch.setattr(standing, "least_certain", lambda _: "")
+    monkeypatch.setattr(standing, "may_be_neutral", lambda _: next(left))
+    monkeypatch.setattr(standing, "refitted", lambda selection, *_: selection)
+    monkeypatch.setattr(SelectionResult, "lacking", lambda self, names: replace(
+        self, accepted=tuple(n for n in self.accepted if n not in names)
+    ))  # fmt: skip
+    monkeypatch.setattr(standing, "errors_before_and_after", lambda selection, _: changed(True, len(selection.accepted)))
+    monkeypatch.setattr(standing, "residual_dependence", lambda *_: [])
+    monkeypatch.setattr(standing, "unexplained", lambda *_: None)
+    problem = SimpleNamespace(predictor=SimpleNamespace(luck=None))
+    searched = SelectionResult(problem, None, None, ("motor-lag", "wheelbase", "yaw-bias"), ())
+    found = standing.standing_of(searched, None, SNAKE, lambda _: None)
+    assert found.selection.accepted == ("motor-lag",)
+    assert found.errors.horizons["stretch"].models[1].rms_m == 1  # those of what stands
+    assert found.withdrawn == ()
 
 
 def test_one_number_that_is_certain_is_enough():
