@@ -7,6 +7,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from types import FrameType
 from typing import Any, Self
@@ -78,7 +79,7 @@ class Watch:
         """DriveEnded or TrialPausedError if the drive must not go on; `picture_s`: when the newest picture came, if known."""
         now_s = self._in_time()
         if sight is not None:
-            self._seen_s = max(self._seen_s, sight.t_s)
+            self._seen_s = max(self._seen_s, min(sight.t_s, now_s))
             x_m, y_m = float(sight.pose[0]), float(sight.pose[1])
             if not self._limits.surface.holds(x_m, y_m):
                 raise DriveEnded(f"the robot left the surface at ({x_m:.2f}, {y_m:.2f}) m")
@@ -208,7 +209,8 @@ class StopsAtTheEnd:
         if not self.last.confirmed:
             if isinstance(error, StopNotConfirmedError):
                 return  # said already, and this attempt changes nothing
-            print(f"bns: {CUT_THE_POWER}", file=sys.stderr, flush=True)  # at once: closing the rig takes seconds more
+            with suppress(OSError, ValueError):  # of a terminal that is gone
+                print(f"bns: {CUT_THE_POWER}", file=sys.stderr, flush=True)  # at once: closing the rig takes seconds more
             why = f" It was being stopped because {error}." if error is not None else ""
             raise StopNotConfirmedError(
                 f"{CUT_THE_POWER} It did not confirm a stop for {self.last.seconds:.1f} s: {self.last.problem}.{why}"

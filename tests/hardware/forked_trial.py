@@ -85,6 +85,17 @@ def knowing_when(set_speed):
     return ordered
 
 
+def standing_after(stop):
+    """The driver's stop, after which the tracker sees a robot that stands."""
+
+    def stopped(self):
+        found = stop(self)
+        Glances.frozen = Glances.frozen or "scene"
+        return found
+
+    return stopped
+
+
 def freeze(what):
     def freezes(*_):
         Glances.frozen = what
@@ -101,6 +112,7 @@ def drive(link, port, journal, patient):
     wheels = np.array([15000.0, 20000.0]) / UNITS_PER_M_S if link == "serial" else None
     khepera.open_tracker = snake.open_tracker = lambda _settings, clock: Glances(clock, wheels)
     KheperaIII.set_speed_m_s = knowing_when(KheperaIII.set_speed_m_s)
+    KheperaIII.stop = standing_after(KheperaIII.stop)
     rig = shipped_rig(robot)
     settings = {} if robot == "khepera" else {**rig.driver, "wiring": link}
     everywhere = replace(rig.limits, surface=Surface(-9.0, 9.0, -9.0, 9.0))

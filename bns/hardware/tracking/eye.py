@@ -17,6 +17,12 @@ SAME_M = 1e-5
 """A camera's noise alone moves what it sees by ten times that, and more."""
 _FRESH_S = 0.1
 _LOOKS, _BETWEEN_S = 10, 0.02
+_AHEAD_S = 0.1
+"""A stamp may be so far ahead of the clock: rounded, or of a camera's own clock."""
+_STANDS_S, _SOON_S, _FEWEST = 0.4, 1.5, 4
+"""A robot stands that is seen so long in one place; it may take so long to come to that."""
+_STANDS_M, _STANDS_RAD = 0.008, 0.1
+"""From the first half of that time to the second, medians of both: 4 cm/s, and more than a tracker's noise."""
 
 
 def _wanders(sights: list[Sight]) -> bool:
@@ -37,6 +43,26 @@ def _measured(sight: Sight) -> Sight:
     return Sight(t_s, pose, residual_m, points)
 
 
+def _changed(sights: list[Sight]) -> np.ndarray | None:
+    """From the first half of the last `_STANDS_S` to the second, medians: x_m, y_m, heading_rad. None: seen too seldom."""
+    if not sights:
+        return None
+    half_s = sights[-1].t_s - _STANDS_S / 2
+    halves: list[list[np.ndarray]] = [[], []]
+    for sight in sights:
+        if sight.t_s >= half_s - _STANDS_S / 2:
+            halves[sight.t_s >= half_s].append(sight.pose)
+    if min(map(len, halves)) < _FEWEST / 2 or sights[0].t_s > half_s - 0.4 * _STANDS_S:
+        return None
+    before, after = (np.median(half, axis=0) for half in halves)
+    return np.asarray(after - before)
+
+
+def _stands(sights: list[Sight]) -> bool:
+    change = _changed(sights)
+    return change is not None and float(np.hypot(*change[:2])) < _STANDS_M and abs(float(change[2])) < _STANDS_RAD
+
+
 class Eye:
     """`heading_rad` is where the robot looks first, give or take half a turn; sights are `delay_s` older than their stamps.
 
@@ -54,7 +80,7 @@ class Eye:
     ) -> None:
         self._tracker, self._clock, self._journal, self._delay_s = tracker, clock, journal, delay_s
         self._called = f"the {kind} tracker" if kind else "the tracker"
-        self._heading_rad, self._newest_s = heading_rad, -1.0
+        self._heading_rad, self._newest_s, self._broken = heading_rad, -1.0, False
         self.wanders = False
         """Whether a robot that stands is seen in another place in every picture, if only by a hundredth of a millimetre."""
         if facts := getattr(tracker, "facts", None):  # of a camera: how it takes its pictures
@@ -70,6 +96,7 @@ class Eye:
 
     def _failed(self, error: Exception) -> TrialPausedError:
         """What is raised of whatever goes wrong in a tracker, ours or somebody else's: the robot is stopped, the trial pauses."""
+        self._broken = True
         if isinstance(error, TrialPausedError):
             return error
         if isinstance(error, HardwareError):
@@ -80,13 +107,20 @@ class Eye:
     def look(self) -> Sight | None:
         """A sight newer than the last, with the time at which it was filmed; None if there is none.
 
-        TrialPausedError if the tracker's device is gone, if it fails in any other way, or if what it gives is no finite pose.
+        TrialPausedError if the tracker's device is gone, if it fails in any other way, or if what it gives is no finite pose, or
+        one that is yet to come: a stamp ahead of the clock would pass for new for as long as it is.
         """
         try:
             found = self._tracker.look()
             sight = None if found is None else _measured(found)
         except Exception as error:
             raise self._failed(error) from error
+        if sight is not None and sight.t_s > self._clock.now_s() + _AHEAD_S:
+            raise TrialPausedError(
+                f"{self._called} gave a pose that is stamped {sight.t_s - self._clock.now_s():.3g} s ahead of the clock. The t_s "
+                "of a sight is the time of the clock that the tracker was opened with (clock.now_s()), when the pose was seen or came; "
+                "no time of day, and not the sender's"
+            )
         if sight is None or (sight.t_s <= self._newest_s and self._clock.now_s() > sight.t_s + _FRESH_S):
             return None
         self._newest_s = sight.t_s
@@ -116,6 +150,24 @@ class Eye:
                 return Sight(sights[-1].t_s, np.mean([s.pose for s in sights], axis=0), sights[-1].residual_m, points)
             self._clock.sleep(_BETWEEN_S)
         return None
+
+    def moving(self) -> str:
+        """How a robot moves that should stand, in a clause; "" if it is seen to stand, or not seen often enough. Never raises."""
+        sights: list[Sight] = []
+        began_s = self._clock.now_s()
+        with suppress(TrialPausedError):
+            while not self._broken and self._clock.now_s() - began_s < _SOON_S:
+                sight = self.look()
+                if sight is not None and sight.t_s >= began_s and (not sights or sight.t_s > sights[-1].t_s):
+                    sights.append(sight)
+                if _stands(sights):
+                    return ""
+                self._clock.sleep(_BETWEEN_S)
+            change = _changed(sights)
+            if change is not None:
+                speed_m_s, turn_rad_s = np.hypot(*change[:2]) / (_STANDS_S / 2), abs(change[2]) / (_STANDS_S / 2)
+                return f"{self._called} sees it move at {speed_m_s:.2f} m/s and turn at {np.degrees(turn_rad_s):.0f}°/s"
+        return ""
 
     def close(self) -> None:
         """Give the tracker's device free. The robot stands by now: a tracker that fails here takes nothing away."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -99,8 +99,14 @@ class WheeledPlatform:
             raise TrialPausedError(f"the robot is lost: {error}") from error
 
     def stop(self) -> Stop:
-        """Stop and confirm."""
-        return self._driver.stop()
+        """Stop; confirmed by the wheels, and by the tracker where it sees the robot: wheels may say that they stand, and turn."""
+        stop = self._driver.stop()
+        moving = self._eye.moving() if stop.confirmed else ""
+        if not moving:
+            return stop
+        problem = f"its wheels say that they stand, but {moving}"
+        self._journal.note("moving", problem=problem)
+        return replace(stop, confirmed=False, problem=problem)
 
     def close(self) -> None:
         """Give port and tracker free."""
