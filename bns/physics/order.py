@@ -57,6 +57,7 @@ ORDER = (
     "mass-offset",
     "side-slip",
     "caster-swing",
+    "caster-trail",
     "caster-drag",
     "floor-patch",
     "wheel-patch",

@@ -84,6 +84,25 @@ class QuadraticTurnSlip(Cause):
 
 @dataclass
 class CasterSwing(Cause):
+    """A caster half a wheelbase ahead drags while it points another way than its pivot moves; it turns with the way."""
+
+    loss: float
+    trail_m: float
+
+    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        pivot = wheels.mean(axis=2) + 0.5j * (wheels[..., 1] - wheels[..., 0])
+        caster, out = np.zeros(len(wheels)), np.empty_like(wheels)
+        for i in range(wheels.shape[1]):
+            speed = np.abs(pivot[:, i])
+            off = np.angle(pivot[:, i] * np.exp(-1j * caster))
+            off = np.where(speed > 1e-3, off, 0.0)
+            out[:, i] = wheels[:, i] * (1 - self.loss * np.sin(off / 2) ** 2)[:, None]
+            caster = caster + off * np.minimum(speed * moment.step_s / self.trail_m, 1.0)
+        return out
+
+
+@dataclass
+class CasterTrail(Cause):
     """A caster whose hinge is half a wheelbase ahead drags while it points another way than its hinge moves; it trails."""
 
     loss: float
@@ -98,7 +117,9 @@ class CasterSwing(Cause):
             kept = 0.0
             for _ in range(FINE):
                 off = np.where(speed > 1e-3, np.angle(pivot[:, i] * np.exp(-1j * caster)), 0.0)
-                off = np.clip(off, 0.05 - np.pi, np.pi - 0.05)  # no floor is so even that it stays upside down
+                upright = np.abs(off) > np.pi - 0.05  # no floor is so even that it stays so: it has fallen to a side by 3 degrees
+                off = np.where(upright, np.copysign(np.pi - 0.05, off), off)
+                caster = np.where(upright, np.angle(pivot[:, i]) - off, caster)
                 left = 1 - self.loss * np.sin(off / 2) ** 2
                 kept = kept + left / FINE
                 caster = caster + left * (speed * np.sin(off) / self.trail_m - turn) * moment.step_s / FINE

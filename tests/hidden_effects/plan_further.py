@@ -20,6 +20,7 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
     ),
     "backlash": ({"gap_m": 0.004}, {"gap_m": 0.01}),
     "caster-swing": ({"loss": 0.3, "trail_m": 0.03}, {"loss": 0.6, "trail_m": 0.05}),
+    "caster-trail": ({"loss": 0.3, "trail_m": 0.015}, {"loss": 0.6, "trail_m": 0.03}),
     "caster-drag": (
         {"friction_m_s": 0.005, "damping_m": 0.002, "trail_m": 0.015, "pivot_m": -0.05},
         {"friction_m_s": 0.015, "damping_m": 0.004, "trail_m": 0.03, "pivot_m": -0.05},
@@ -112,6 +113,8 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
 BESIDE: dict[str, dict[str, Parameters]] = {"wheel-diameters": {"acceleration-limit": {"max_m_s2": 0.25}}}
 """What an effect needs beside it to differ from a simpler one: without limits, diameters are a mismatch of commands."""
 ALIKE = {
+    "caster-swing": ("caster-trail",),
+    "caster-trail": ("caster-swing",),
     "slope-load": ("tether-load",),
     "floor-patch": ("wheel-patch", "uneven-patch"),
     "wheel-patch": ("floor-patch", "uneven-patch"),
@@ -127,6 +130,7 @@ TURNING = {
     "breakaway",
     "caster-drag",
     "caster-swing",
+    "caster-trail",
     "dead-band",
     "gear-friction",
     "mass-offset",

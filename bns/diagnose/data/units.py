@@ -10,7 +10,7 @@ import pandas as pd
 from bns.diagnose.data.mapping import SIZES
 from bns.diagnose.data.merge_topics import without_commands
 from bns.diagnose.data.speed_units import Ways, mistake_of, speed_note
-from bns.diagnose.data.unlike_axes import refuse_unlike_axes
+from bns.diagnose.data.unlike_axes import opposite_turns, refuse_unlike_axes
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 from bns.measurements import COMMANDS, POSE
@@ -100,11 +100,7 @@ def check_units(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -
         ].T  # larger ones may be rounds
         same = float(told @ seen / np.sqrt((told @ told) * (seen @ seen) + 1e-300))
         if same < -0.5:
-            raise DataError(
-                "The robot turns opposite to the wheels: heading_rad must run counter-clockwise (in the mapping of `bns import`, "
-                "give clockwise: true), or left_m_s and right_m_s are exchanged, or the signs of both wheels are reversed (give "
-                "both scale: -1)."
-            )
+            raise DataError(opposite_turns(driven.forward_m, *moved))
     return speed_note(driven)
 
 

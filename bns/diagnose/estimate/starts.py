@@ -18,7 +18,7 @@ from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect, Parameter
 from bns.physics.model import Model
-from bns.physics.order import FRICTION, RAMPS
+from bns.physics.order import FORMULAS, FRICTION, RAMPS
 
 _SHARES = DEFAULTS.estimate.start_shares
 NOTHING = DEFAULTS.estimate.start_nothing
@@ -68,7 +68,7 @@ def fit_with(problem: Problem, base: Fit, effect: Effect, known: Model | None = 
     """
     start = best_start(problem, base, effect, known)
     hoped = min(start.loss, start.promised) if problem.predictor.screening is None else start.loss
-    hopeless = base.loss - hoped < NOTHING * base.loss / len(base.losses)
+    hopeless = effect.after != FORMULAS and base.loss - hoped < NOTHING * base.loss / len(base.losses)
     return on_either_side(problem, problem.fit(start.model, 0 if hopeless else None, start.jacobian_by_parameter), effect)
 
 
@@ -118,7 +118,8 @@ def best_start(problem: Problem, base: Fit, effect: Effect, known: Model | None 
     """The fitted model with the effect at the most promising of its starts, one step of least squares taken.
 
     An effect with a jagged loss, beside one that looks like it, is judged after that step: what the other one makes up for now,
-    such as a lag for the ticks of a clock, has to give way first.
+    such as a lag for the ticks of a clock, has to give way first. Starts of a formula at which it does nothing (a limit that
+    nothing reaches) come last: no slope leads away from them.
     """
     lows, highs = ([getattr(p, end) for p in effect.parameters] for end in ("low", "high"))
     found = (tuple(np.clip(values, lows, highs).tolist()) for values in _starts(effect, problem.predictor, base.model))
@@ -126,6 +127,9 @@ def best_start(problem: Problem, base: Fit, effect: Effect, known: Model | None 
     if known is not None and effect.name in {active.effect.name for active in known.effects}:
         starts.append(base.model.with_active(effect, tuple(known.values_of(effect.name).values())))
     losses = [problem.loss(start) for start in starts]
+    if effect.after == FORMULAS:
+        acting = [loss if loss != base.loss else np.inf for loss in losses]
+        losses = acting if np.isfinite(acting).any() else losses
     beside = {active.effect.name for active in base.model.effects} & set(effect.lookalikes)
     followed = range(len(starts)) if beside and any(p.jagged for p in effect.parameters) else [int(np.argmin(losses))]
     return min((_stepped(problem, base, starts[i], losses[i]) for i in followed), key=lambda one: one.loss)

@@ -118,8 +118,8 @@ class Eye:
         if sight is not None and sight.t_s > self._clock.now_s() + _AHEAD_S:
             raise TrialPausedError(
                 f"{self._called} gave a pose that is stamped {sight.t_s - self._clock.now_s():.3g} s ahead of the clock. The t_s "
-                "of a sight is the time of the clock that the tracker was opened with (clock.now_s()), when the pose was seen or came; "
-                "no time of day, and not the sender's"
+                "of a sight is a time of the clock that the tracker was opened with (clock.now_s()): when the pose was seen, or "
+                "came. It is no time of day, and not the sender's"
             )
         if sight is None or (sight.t_s <= self._newest_s and self._clock.now_s() > sight.t_s + _FRESH_S):
             return None

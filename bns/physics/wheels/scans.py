@@ -9,6 +9,11 @@ from bns.engine.jit import exact
 from bns.engine.pose_filter import slope
 from bns.physics.signals import Array
 
+_CIN_TERMS = 13
+"""The next term at pi is below 1e-16."""
+_NO_WAY = 1e-6
+"""Ways below this share of the trail: the difference of two integrals would be rounding errors."""
+
 _NO_SWING = 1e-10
 """Shares of the square of the lag below which a swing is none: its rate of decay would be lost in rounding."""
 _NEARLY_EQUAL = 1e-4
@@ -270,6 +275,39 @@ def trailing(angle: Array, way: Array, trail: float) -> Array:
             out[row, k] = off * np.exp(-way[row, k] / (2.0 * trail))
             follower += off * -np.expm1(-way[row, k] / trail)
     return out
+
+
+@exact
+def swung(angle: Array, way: Array, trail: float) -> Array:
+    """Mean over each step of (1 - cos(off))/2, ``off`` as in `trailing`; 0 where there is no way; exact.
+
+    By the entire cosine integral Cin(x), the integral of (1 - cos u)/u from 0 to x: off falls as exp(-way/trail).
+    """
+    out = np.zeros_like(angle)
+    for row in range(angle.shape[0]):
+        follower = 0.0
+        for k in range(angle.shape[1]):
+            if way[row, k] == 0.0:
+                continue
+            share = way[row, k] / trail
+            off = (angle[row, k] - follower + np.pi) % (2.0 * np.pi) - np.pi
+            left = off * np.exp(-share)
+            if share < _NO_WAY:
+                out[row, k] = (1.0 - np.cos(off)) / 2.0
+            else:
+                out[row, k] = (_cin(off) - _cin(left)) / (2.0 * share)
+            follower += off - left
+    return out
+
+
+@exact
+def _cin(x: float) -> float:
+    """The entire cosine integral for |x| <= pi, by its series: sum of (-1)^(k+1) x^(2k)/(2k (2k)!)."""
+    term, total = 1.0, 0.0
+    for k in range(1, _CIN_TERMS + 1):
+        term *= x * x / ((2.0 * k - 1.0) * 2.0 * k)
+        total += term / (2.0 * k) if k % 2 else -term / (2.0 * k)
+    return total
 
 
 @exact

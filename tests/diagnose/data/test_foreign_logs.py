@@ -19,6 +19,7 @@ from bns.diagnose.data.quaternions import yaw
 from bns.diagnose.data.sources.read import read_table
 from bns.diagnose.data.split_trials import KEPT_S, RUN_UP_S, split
 from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.data.units import check_units
 from bns.diagnose.predict.check_robot import check_same_robot
 from bns.diagnose.predict.paired_errors import paired_errors
 from bns.diagnose.predict.wheels import WheelPredictor
@@ -361,3 +362,23 @@ def test_long_quaternions_of_a_robot_on_its_side_are_refused():
     half = np.radians(70.0) / 2
     with pytest.raises(DataError, match="is 70 degrees off up"):
         yaw(pd.DataFrame({"x": 2 * np.sin(half), "y": 0.0, "z": 0.0, "w": 2 * np.cos(half)}, index=range(3)), "z")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (lambda t: t.assign(left_m_s=t["right_m_s"], right_m_s=t["left_m_s"]), "left_m_s and right_m_s are exchanged"),
+        (lambda t: t.assign(heading_rad=-t["heading_rad"]), "give it clockwise: true"),
+        (lambda t: t.assign(left_m_s=-t["left_m_s"], right_m_s=-t["right_m_s"]), "the signs of both wheels are reversed"),
+        (lambda t: t.assign(y_m=-t["y_m"], heading_rad=-t["heading_rad"]), "positions and headings are both mirrored"),
+        (lambda t: t.assign(x_m=t["x_m"].to_numpy()[::-1], heading_rad=-t["heading_rad"]), "or the signs of both wheels"),
+    ],
+)  # fmt: skip
+def test_a_robot_that_turns_opposite_to_its_wheels_is_told_the_one_cause(wrong, said):
+    """Whether path and headings belong together tells exchanged wheels from headings that run clockwise."""
+    table = wrong(measured(NOMINAL, trials=12))
+    trials = [(str(name), rows.to_numpy()) for name, rows in table.reset_index(drop=True).groupby("trial").groups.items()]
+    with pytest.raises(DataError, match="turns opposite to the wheels") as refused:
+        check_units(table.reset_index(drop=True), trials)
+    assert said in str(refused.value)
+    assert ("exchanged" in str(refused.value)) == (said != "give it clockwise: true")
