@@ -30,6 +30,7 @@ from bns.physics.model import Model
 LEAST_FALL = DEFAULTS.select.least_fall
 CHANCE = DEFAULTS.residuals.chance
 FEWEST_CLOCKS = DEFAULTS.verdict.fewest_clocks
+STEADY = DEFAULTS.verdict.clock_steady
 
 
 def on_effects(
@@ -65,7 +66,8 @@ def on_effects(
         yield (
             f"{per_trial_effect.effect.name} has a separate value in each trial, {own.min():+.3f} to {own.max():+.3f} s; "
             "held-out trials are judged with the clock fitted to other poses of the same trial. "
-            "A delay common to all trials cannot be distinguished from the clocks."
+            "A delay common to all trials cannot be distinguished from the clocks, nor can commands that take effect later in "
+            "some trials than in others."
         )
         if tracks.start_known:
             yield from _on_drift(per_trial_effect.effect.name, tracks.start_s, own)
@@ -73,8 +75,9 @@ def on_effects(
 
 def on_servo_speed(selection: SelectionResult) -> Iterator[str]:
     """What the limit of the servos' speed is in radians per second: a share alone nobody can measure."""
-    predictor, name = selection.problem.predictor, "servo-speed-limit"
-    if name in selection.accepted and isinstance(predictor, JointedPredictor):
+    name = "servo-speed-limit"
+    predictor = selection.problem.predictor if name in selection.accepted else None
+    if isinstance(predictor, JointedPredictor):
         told, share = predictor.told_rad_s, selection.fit.model.values_of(name)["share"]
         yield (
             f"{name}: set points move at up to {told:.3g} rad/s (over half a second), so the servos turn at up to "
@@ -110,10 +113,14 @@ def _on_drift(name: str, start_s: Array, own_s: Array) -> Iterator[str]:
     t = abs(r) * np.sqrt((trials - 2) / max(1.0 - r * r, 1e-12))
     if 2.0 * float(stdtr(trials - 2, -t)) < CHANCE:
         rate = r * float(own_s.std() / start_s.std())
-        yield (
-            f"The values of {name} change by {3600 * rate:+.3g} s per hour of the session (correlation {r:+.2f}): the clocks "
-            f"run at rates that differ by {1e6 * abs(rate):.3g} parts in a million."
-        )
+        changes = f"The values of {name} change by {3600 * rate:+.3g} s per hour of the session (correlation {r:+.2f})"
+        if abs(r) > STEADY:
+            yield f"{changes}: the clocks run at rates that differ by {1e6 * abs(rate):.3g} parts in a million."
+        else:
+            yield (
+                f"{changes}, and not evenly, as clocks that run at different rates would have it: something else delays, such as "
+                "a queue of commands."
+            )
 
 
 def _on_stamps(tracks: Tracks, names: Collection[str]) -> Iterator[str]:

@@ -56,7 +56,7 @@ def standing_of(
     while withdraw and selection.accepted and not errors.falls:
         selection, errors = _without_the_worst(selection, predictor, given)
     withdrawn = tuple(name for name in searched if name not in selection.accepted)
-    while neutral := may_be_neutral(selection):
+    while withdraw and (neutral := may_be_neutral(selection)):
         selection = refitted(selection.lacking((neutral,)), predictor, given)
         errors = errors_before_and_after(selection, given)
     tick("what is left")

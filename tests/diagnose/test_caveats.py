@@ -166,7 +166,7 @@ def test_terms_with_which_the_error_does_not_fall_are_in_no_extended_model(monke
         "unlisted", SimpleNamespace(fit=fits["without"], accepted=("speed-gain",)), errors_with_terms=errors,
         terms=(SimpleNamespace(fit=fits["with"], name="unlisted", signal="speed"),),
     )  # fmt: skip
-    result = DiagnoseResult(SimpleNamespace(model=None, measured=None), found)
+    result = DiagnoseResult(SimpleNamespace(model=None, measured=None, predictor=None), found)
     assert found.numbers == {"speed-gain": 0.8 if added else 0.9}
     assert result.extended == ("with" if added else "without")
 
@@ -269,6 +269,17 @@ def test_clocks_that_move_along_the_session_are_said_to(monkeypatch, rate, scatt
         assert sum("parts in a million" in note for note in on_effects(with_clocks(own_s), tracks)) == (said and known)
     assert list(_on_drift("clock-offset", start_s[:4], own_s[:4])) == []
     assert list(_on_drift("clock-offset", 0 * start_s, own_s)) == []
+
+
+@pytest.mark.parametrize(("scatter_s", "steady"), [(0.01, True), (0.03, False)])
+def test_clocks_that_follow_the_session_unevenly_do_not_differ_by_a_rate(scatter_s, steady):
+    """0.14 s along the session, of which 0.04 s is the standard deviation."""
+    start_s = np.arange(40.0) * 35.0
+    own_s = 1e-4 * start_s + scatter_s * np.random.default_rng(3).normal(size=40)
+    assert (abs(np.corrcoef(start_s, own_s)[0, 1]) > 0.9) == steady
+    (note,) = _on_drift("clock-offset", start_s, own_s)
+    assert ("parts in a million" in note) == steady
+    assert ("such as a queue of commands" in note) == (not steady)
 
 
 def with_clocks(own_s):

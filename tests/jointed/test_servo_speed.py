@@ -1,9 +1,12 @@
 """Servos that turn too slowly: found where set points jump, and the same speed on a log whose set points move otherwise."""
 
+from types import SimpleNamespace
+
 import pytest
 import yaml
 
 import bns
+from bns.diagnose.effect_caveats import on_servo_speed
 from bns.physics.jointed.mechanism import machine
 from bns.physics.jointed.model_files import load_body
 from tests.jointed.arm import log, xml
@@ -50,3 +53,13 @@ def test_a_model_knows_what_its_limit_is_a_share_of(place):
     snake = load_body("snake").with_effect("servo-speed-limit", share=0.5)
     assert not snake.limited_by_set_points  # all its servos are told to move at one speed
     assert machine(snake.mechanism).mechanism.joint_speed_rad_s > 0
+
+
+@pytest.mark.parametrize(("accepted", "said"), [(("servo-speed-limit",), 1), (("dead-band",), 0)])
+def test_the_speed_is_said_in_radians_per_second(monkeypatch, accepted, said):
+    monkeypatch.setattr("bns.diagnose.effect_caveats.JointedPredictor", SimpleNamespace)
+    model = load_body("snake").with_effect("servo-speed-limit", share=0.25)
+    problem, fit = SimpleNamespace(predictor=SimpleNamespace(told_rad_s=6.4)), SimpleNamespace(model=model)
+    notes = list(on_servo_speed(SimpleNamespace(accepted=accepted, problem=problem, fit=fit)))
+    assert len(notes) == said
+    assert all("up to 6.4 rad/s" in note and "turn at up to 1.6 rad/s" in note for note in notes)

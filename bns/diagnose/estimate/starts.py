@@ -68,7 +68,8 @@ def fit_with(problem: Problem, base: Fit, effect: Effect, known: Model | None = 
     """
     start = best_start(problem, base, effect, known)
     hoped = min(start.loss, start.promised) if problem.predictor.screening is None else start.loss
-    hopeless = effect.after != FORMULAS and base.loss - hoped < NOTHING * base.loss / len(base.losses)
+    from_afar = effect.after == FORMULAS and start.loss > base.loss
+    hopeless = base.loss - hoped < NOTHING * base.loss / len(base.losses) and not from_afar
     return on_either_side(problem, problem.fit(start.model, 0 if hopeless else None, start.jacobian_by_parameter), effect)
 
 
@@ -128,7 +129,7 @@ def best_start(problem: Problem, base: Fit, effect: Effect, known: Model | None 
         starts.append(base.model.with_active(effect, tuple(known.values_of(effect.name).values())))
     losses = [problem.loss(start) for start in starts]
     if effect.after == FORMULAS:
-        acting = [loss if loss != base.loss else np.inf for loss in losses]
+        acting = [np.inf if np.isclose(loss, base.loss, rtol=1e-9, atol=0.0) else loss for loss in losses]
         losses = acting if np.isfinite(acting).any() else losses
     beside = {active.effect.name for active in base.model.effects} & set(effect.lookalikes)
     followed = range(len(starts)) if beside and any(p.jagged for p in effect.parameters) else [int(np.argmin(losses))]

@@ -228,6 +228,12 @@ class Verdict:
         "With fewer trials, nothing is said of clocks that change along the session, whatever the p-value; "
         f"{BY_HAND}.",
     )
+    clock_steady: float = setting(
+        0.9,
+        "correlation",
+        "Clocks of trials that follow the session less closely do not differ by a rate: a queue of commands that fills and "
+        "empties again gave 0.38. Four fifths of their change must be even.",
+    )
     often: float = setting(
         1 / 3,
         "1",

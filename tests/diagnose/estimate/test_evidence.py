@@ -201,4 +201,4 @@ def test_a_start_that_earns_next_to_nothing_of_what_a_trial_loses_is_not_followe
     monkeypatch.setattr(starts, "best_start", lambda *_: start)
     base = SimpleNamespace(loss=100.0, losses=np.full(10, 10.0))
     problem = SimpleNamespace(fit=lambda *asked: asked, predictor=SimpleNamespace(screening=screening))
-    assert starts.fit_with(problem, base, SimpleNamespace(name="any")) == ("there", rounds, "nearby")
+    assert starts.fit_with(problem, base, SimpleNamespace(name="any", after="motor-lag")) == ("there", rounds, "nearby")

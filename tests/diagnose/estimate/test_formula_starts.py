@@ -52,6 +52,20 @@ def test_a_sum_of_numbers_times_something_starts_at_nothing(term, linear):
         assert set(effect.neutral.values()) == {0.0}
 
 
+@pytest.mark.parametrize("limit_m_s", [0.15, 0.17])
+def test_a_limit_is_found_from_starts_of_which_the_best_limits_nothing(limit_m_s):
+    """Wheels share a supply: from 0.3 on it suffices for both, and 0.1 is worse than no limit at all."""
+    effect = formula_effect("power", "min(1, k / (abs(l) + abs(r) + 0.0001)) - 1", "share")
+    truth = NOMINAL.with_active(effect, (limit_m_s,))
+    predictor = WheelPredictor(tracks_of(measured(truth, trials=12, seed=3, speeds=(-0.12, 0.12))))
+    problem = problem_for(predictor, NOMINAL)
+    base = problem.fit(NOMINAL)
+    assert problem.loss(NOMINAL.with_active(effect, (0.1,))) > base.loss
+    assert problem.loss(NOMINAL.with_active(effect, (0.3,))) == pytest.approx(base.loss, rel=1e-12)
+    found = fit_with(problem, base, effect)
+    assert found.values[0] == pytest.approx(limit_m_s, abs=0.003)
+
+
 @pytest.mark.parametrize("per_volt", [0.004, 0.0435])
 def test_the_only_number_of_a_limit_is_found_whatever_its_size(per_volt):
     """From 0.1 on the limit would be 1.2 m/s, far above all commands: there no slope leads back."""
