@@ -39,5 +39,5 @@ EFFECT = Effect(
     measurement="film the caster after a reversal, or replace it with a sliding button and repeat some trials",
     apply=apply,
     needs="track",
-    starts=tuple((loss, trail) for loss in (0.05, 0.3) for trail in (0.005, 0.02, 0.06)),
+    starts=tuple((loss, trail) for loss in (0.1, 0.4) for trail in (0.005, 0.012, 0.03, 0.06)),
 )
