@@ -11,13 +11,13 @@ import pandas as pd
 
 from bns.api.common.arguments import checked_progress
 from bns.api.common.cache import remembered
-from bns.api.common.prepared import Prepared, PreparedNetworks, are_networks, prepared, prepared_networks
+from bns.api.common.prepared import Prepared, PreparedNetworks, are_networks, prepared, prepared_networks, these_very
 from bns.api.common.progress import Meter, Progress
 from bns.api.common.provenance import provenance
 from bns.api.common.shown import Shown
 from bns.api.measurements import Log, Measurements
 from bns.api.model import Given, Model
-from bns.diagnose.adding import fitted_to, model_yaml
+from bns.diagnose.adding import known_to, model_yaml
 from bns.diagnose.comparison import Comparison
 from bns.diagnose.comparison import compare as held_against
 from bns.diagnose.predict.base import Predictor
@@ -207,8 +207,8 @@ def _of_its_own(first: Predictor, other: Prepared) -> Predictor | None:
 def _fitted_here(ready: Prepared, named: Sequence[tuple[str, Model, Predictor | None]]) -> tuple[str, ...]:
     """What to beware of: models that were fitted to these measurements know them."""
     of_others = [
-        f"The model {name} was fitted to these very measurements ({ready.log.name}): its errors are lower than on new ones."
+        f"The model {name} was fitted to {these_very(known, ready.measured)}: its errors are lower than on new ones."
         for name, one, _ in named
-        if fitted_to(one, ready.measured.digest)
+        if (known := known_to(one, ready.measured))
     ]
     return tuple(note for note in (ready.fitted_here, *of_others) if note)

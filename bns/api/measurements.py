@@ -144,7 +144,7 @@ class Measurements(Shown):
 
     def checked_again(self) -> Measurements:
         """The same rows, checked under the settings that are in force."""
-        return self._of(self._measured.table)
+        return self._of(self._measured.table, same=True)
 
     def without_rows(self, rows: Iterable[int]) -> Measurements:
         """The same measurements without the poses of some rows (of `frame`, from 0, as `findings` counts them).
@@ -224,11 +224,12 @@ class Measurements(Shown):
         fewer._given, fewer._in_memory = _GIVEN_IN_MEMORY, True
         return fewer
 
-    def _of(self, table: pd.DataFrame) -> Measurements:
-        """Some of the same rows, or the same with other marks."""
-        fewer = copy(self)
+    def _of(self, table: pd.DataFrame, same: bool = False) -> Measurements:
+        """Some of the same rows, or the same with other marks; ``same``: all of them as they are."""
+        fewer, was = copy(self), self._measured
+        files = was.files if same else tuple((name, "") for name, _ in was.files)
         fewer.__dict__ = {
-            "_measured": measured_table(table, self._measured.path),
+            "_measured": measured_table(table, was.path, was.digest if same else "", files=files),
             "_given": self._given,
             "_in_memory": self._in_memory,
         }

@@ -199,12 +199,13 @@ def documented(
     fit: Fit, before: Model, measured: Measured, errors: PairedErrors | None, predictor: Predictor
 ) -> Model:
     """The fitted model with intervals, reasons and provenance; errors of None: none are known."""
-    reason = f"fitted to {len(measured.tracks)} trials of {measured.path.name} ({measured.digest})"
+    reason = f"fitted to {len(measured.tracks)} trials of {measured.called} ({measured.digest})"
     effects = tuple(_with_interval(fit, active, reason) for active in fit.model.effects)
     provenance = {
         "begun_from": before.name,
-        "data": measured.path.name,
+        "data": measured.called,
         "data_sha256": measured.digest,
+        **({"logs": [{"data": name, "data_sha256": digest} for name, digest in measured.files]} if measured.files else {}),
         "date": datetime.now(UTC).strftime("%Y-%m-%d"),
         "trials": len(measured.tracks),
         "held_out_position_error_m": {
@@ -221,8 +222,25 @@ def documented(
 
 
 def fitted_to(model: Model, digest: str) -> bool:
-    """Whether numbers of a model came of the measurements with this digest, as `documented` says where they come from."""
-    return bool(model.provenance.get("data_sha256") == digest)
+    """Whether numbers of a model came of the measurements with this digest, as `documented` says where they come from.
+
+    Of several files taken together, those of each one alone do, too.
+    """
+    return bool(digest) and digest in _digests(model)
+
+
+def known_to(model: Model, measured: Measured) -> str:
+    """The names of the logs among these measurements that numbers of a model came of; "" for none."""
+    if fitted_to(model, measured.digest):
+        return measured.called
+    return ", ".join(name for name, digest in measured.files if fitted_to(model, digest))
+
+
+def _digests(model: Model) -> set[str]:
+    """Of the measurements that a model was fitted to, and of each file of them."""
+    logs = model.provenance.get("logs")
+    each = [one for one in logs if isinstance(one, dict)] if isinstance(logs, list) else []
+    return {str(one["data_sha256"]) for one in (model.provenance, *each) if one.get("data_sha256")}
 
 
 def _with_interval(fit: Fit, active: ActiveEffect, reason: str) -> ActiveEffect:

@@ -1,9 +1,14 @@
 """A model is judged on the measurements that it was fitted to: every answer says so, and none does on new ones."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import pytest
+import yaml
 
 import bns
 from bns.diagnose.adding import fitted_to
+from bns.diagnose.report.page import _origin
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
 SAID = "was fitted to these very measurements"
@@ -54,3 +59,43 @@ def test_a_model_whose_numbers_were_all_fitted_again_no_longer_knows_the_first_l
 
 def test_a_model_of_a_drawing_was_fitted_to_nothing(logs):
     assert not bns.compare(logs[0], NOMINAL).notes
+
+
+def test_of_several_logs_each_one_alone_is_known(logs, model, tmp_path):
+    both = bns.add(logs, "motor-lag", bns.Model(NOMINAL))
+    path = both.model.save(tmp_path / "both.yaml")
+    made_of = yaml.safe_load(path.read_text())
+    assert "24 trials of known.csv, new.csv" in made_of["effects"][0]["reason"]
+    told = made_of["provenance"]
+    digests = [bns.Measurements(log).measured.digest for log in logs]
+    assert told["logs"] == [{"data": log.name, "data_sha256": d} for log, d in zip(logs, digests, strict=True)]
+    assert told["data"] == "known.csv, new.csv"
+    for log in logs:
+        assert f"{SAID} ({log.name})" in bns.compare(log, path).notes[0]
+        assert f"{SAID} ({log.name})" in bns.compare(log, NOMINAL, beside=path).notes[0]
+    assert f"{SAID} (known.csv, new.csv)" in bns.compare(logs, path).notes[0]
+    assert f"{SAID} (known.csv, new.csv)" in bns.compare(bns.Measurements(list(logs)).checked_again(), path).notes[0]
+    assert "was fitted to some of these very measurements (known.csv)" in bns.compare(logs, model).notes[0]
+
+
+def test_of_rows_of_several_logs_the_names_stay(logs):
+    fewer = bns.Measurements(list(logs)).without("0")
+    assert fewer.measured.files == (("known.csv", ""), ("new.csv", ""))
+    assert "23 trials of known.csv, new.csv" in bns.add(fewer, "motor-lag", NOMINAL).model.effects[0].reason
+
+
+def test_the_report_names_all_logs(logs):
+    both = bns.Measurements(list(logs)).measured
+    (known, first), (new, second) = both.files
+    told = _origin(SimpleNamespace(measured=both, model=NOMINAL))
+    assert f"Data {known}, SHA-256 {first}…; {new}, SHA-256 {second}…; together SHA-256 {both.digest}…; model" in told
+    alone = bns.Measurements(logs[0]).measured
+    assert f"Data known.csv, SHA-256 {first}…; model" in _origin(SimpleNamespace(measured=alone, model=NOMINAL))
+
+
+def test_files_of_old_models_and_odd_ones_are_read(logs, model):
+    told = yaml.safe_load(model.read_text())["provenance"]
+    assert "logs" not in told  # of one file, as it always was
+    for odd in ("known.csv", [1, {"data": "known.csv"}], None):
+        assert not fitted_to(replace(NOMINAL, provenance={"logs": odd}), told["data_sha256"])
+    assert not fitted_to(NOMINAL, "")

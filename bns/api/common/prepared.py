@@ -8,7 +8,7 @@ from pathlib import Path
 from bns.api.common.arguments import named_model
 from bns.api.measurements import Log, Measurements, as_measurements
 from bns.api.model import Given, Model, as_model
-from bns.diagnose.adding import fitted_to
+from bns.diagnose.adding import known_to
 from bns.diagnose.data.bodies.cycles import CycleTracks, marker_noise_m
 from bns.diagnose.data.bodies.joints import SET, JointTracks, check_names, check_scales
 from bns.diagnose.data.bodies.stretches import stretches_of_cycles, stretches_of_joints
@@ -44,10 +44,11 @@ class Prepared:
     @property
     def fitted_here(self) -> str:
         """That the model was fitted to these very measurements, in words; "" where it was not."""
-        if not fitted_to(self.model, self.measured.digest):
+        known = known_to(self.model, self.measured)
+        if not known:
             return ""
         return (
-            f"The model as given was fitted to these very measurements ({self.log.name}): its errors are those of trials that it "
+            f"The model as given was fitted to {these_very(known, self.measured)}: its errors are those of trials that it "
             "knows, not of trials held out, and lower than on new ones."
         )
 
@@ -59,6 +60,12 @@ class Prepared:
             return _used_in_words(tracks, self.predictor) + _of_no_servo(tracks, self.model)
         used, there = len(self.predictor.tracks.t_s), len(self.log.measured.tracks.t_s)
         return f"{used} of {there} poses are used, evenly chosen; all commands are" if used < there else ""
+
+
+def these_very(known: str, measured: Measured) -> str:
+    """The measurements of the logs ``known``, which a model was fitted to, in words."""
+    part = "" if known == measured.called else "some of "
+    return f"{part}these very measurements ({known})"
 
 
 @dataclass(frozen=True)

@@ -38,6 +38,13 @@ class Measured:
     """What a column ``robot`` says; "" where there is none."""
     table: pd.DataFrame = field(default_factory=pd.DataFrame, repr=False, compare=False)
     """The rows that the tracks were made of."""
+    files: tuple[tuple[str, str], ...] = ()
+    """Of several files taken together the name and the digest of each, "" where only some of its rows are there."""
+
+    @property
+    def called(self) -> str:
+        """The names of all files."""
+        return ", ".join(name for name, _ in self.files) or self.path.name
 
 
 def load_measured(path: str | Path, robot: str | None = None, more: Sequence[Path] = ()) -> Measured:
@@ -49,11 +56,17 @@ def load_measured(path: str | Path, robot: str | None = None, more: Sequence[Pat
     path = Path(path)
     table = _joined([path, *more])
     digest = _bytes_sha256([path, *more])[:20]
-    return measured_table(table, path, digest, robot)
+    each = tuple((one.name, _bytes_sha256([one])[:20]) for one in (path, *more)) if more else ()
+    return measured_table(table, path, digest, robot, each)
 
 
-def measured_table(table: pd.DataFrame, path: Path, digest: str = "", robot: str | None = None) -> Measured:
-    """Check a table that was read and mapped already. ``path`` names it; ``digest``: by default that of its values."""
+def measured_table(
+    table: pd.DataFrame, path: Path, digest: str = "", robot: str | None = None, files: tuple[tuple[str, str], ...] = ()
+) -> Measured:
+    """Check a table that was read and mapped already. ``path`` names it; ``digest``: by default that of its values.
+
+    ``files``: as `Measured` has them.
+    """
     with naming(path):
         table = _kept(_of_one_robot(table, robot))
     if "trial" in table.columns:
@@ -61,7 +74,7 @@ def measured_table(table: pd.DataFrame, path: Path, digest: str = "", robot: str
     of = str(table["robot"].dropna().iloc[0]) if "robot" in table.columns and table["robot"].notna().any() else ""
     with naming(path):
         tracks, findings = _tracks(table)
-    return Measured(path, tracks, tuple(findings), digest or table_sha256(table)[:20], of, table)
+    return Measured(path, tracks, tuple(findings), digest or table_sha256(table)[:20], of, table, files)
 
 
 def _bytes_sha256(paths: Sequence[Path]) -> str:

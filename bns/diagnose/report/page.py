@@ -92,6 +92,13 @@ def report_html(m: Material, command: Mapping[str, str]) -> str:
     return environment.from_string(_part("report.html.j2")).render(**_values(m, command))
 
 
+def _origin(m: Material) -> str:
+    """Names and digests of the logs and of the model."""
+    each = "".join(f"{name}, SHA-256 {digest}…; " for name, digest in m.measured.files if digest)
+    whole = f"together SHA-256 {m.measured.digest}…" if each else f"{m.measured.called}, SHA-256 {m.measured.digest}…"
+    return f"Data {each}{whole}; model {m.model.name}, {m.model.digest}."
+
+
 def _values(m: Material, command: Mapping[str, str]) -> dict[str, Any]:
     d, has_found = m.diagnosis, m.diagnosis.selection is not None
     has_after = bool(m.paths) and "after" in m.paths[0]
@@ -99,7 +106,7 @@ def _values(m: Material, command: Mapping[str, str]) -> dict[str, Any]:
     values: dict[str, Any] = {
         "css": Markup(_part("report.css")),
         "js": Markup(_part("report.js")),
-        "data_name": m.measured.path.name,
+        "data_name": m.measured.called,
         "model_name": m.model.name,
         "trials": len(m.measured.tracks),
         "verdict": d.verdict,
@@ -132,7 +139,7 @@ def _values(m: Material, command: Mapping[str, str]) -> dict[str, Any]:
         "equations": tables.equations_table(d) if d.effects else None,
         "findings": tables.findings_table(m.measured) if m.measured.findings else None,
         "findings_title": f"{len(m.measured.findings)} irregularities in the data",
-        "origin": f"Data {m.measured.path.name}, SHA-256 {m.measured.digest}…; model {m.model.name}, {m.model.digest}.",
+        "origin": _origin(m),
     }
     titles = {"paths": "paths", "errors": "errors", "comparison": "where it fails", "ranking": "every effect"}
     places = {"errors": "error", "comparison": "where"}
