@@ -10,6 +10,7 @@ import dataclasses
 import hashlib
 import json
 import math
+import numbers
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -175,6 +176,7 @@ def checked(name: str, value: Any) -> Any:
     if name not in FIELDS:
         raise SpecError(unknown_name("parameter", name, FIELDS))
     wanted, meta = field_type(name), FIELDS[name].metadata
+    value = _plain(value)
     fits = isinstance(value, wanted) and not isinstance(value, bool)
     if wanted is float and isinstance(value, int) and not isinstance(value, bool):
         value, fits = float(value), True
@@ -197,6 +199,13 @@ def checked(name: str, value: Any) -> Any:
     if not math.isfinite(value) or (low is not None and value < low) or (high is not None and value > high):
         raise SpecError(f"{name} is {value!r}; it must be {_allowed(name)}.{_percent_hint(name, value)}")
     return value
+
+
+def _plain(value: Any) -> Any:
+    """Numbers of numpy and other libraries as Python's own; all else as it is."""
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        return value
+    return int(value) if isinstance(value, numbers.Integral) else float(value)
 
 
 def unquoted(value: Any) -> str:

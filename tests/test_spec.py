@@ -3,6 +3,7 @@
 import dataclasses
 import json
 
+import numpy as np
 import pytest
 
 from bns.errors import SpecError
@@ -40,6 +41,18 @@ def test_the_version_of_an_approach_is_part_of_its_runs_names_alone():
 def test_whole_numbers_and_shares_are_taken_as_their_own_type():
     assert RunSpec(population_size=50.0).run_id == RunSpec(population_size=50).run_id
     assert isinstance(RunSpec(mutation_rate=1).mutation_rate, float)
+
+
+def test_numbers_of_numpy_are_the_plain_ones():
+    given = RunSpec(seed=np.int64(3), evaluations=np.uint8(5), mutation_rate=np.float32(0.25), tournament_size=np.float64(0.3))
+    plain = RunSpec(seed=3, evaluations=5, mutation_rate=0.25, tournament_size=0.3)
+    assert given.run_id == plain.run_id
+    for name in FIELDS:
+        assert type(getattr(given, name)) is type(getattr(plain, name))
+    assert RunSpec(evaluations=np.float32(5)).run_id == RunSpec(evaluations=5).run_id
+    for odd in (np.True_, np.float64(1.5), np.array([3])):
+        with pytest.raises(SpecError, match="it must be a whole number"):
+            RunSpec(seed=odd)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cached_property
-from os import PathLike
+from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack, cast
 
@@ -20,6 +20,7 @@ from bns.approaches import check_networked
 from bns.bootstrap import loop
 from bns.errors import ModelError, SpecError, unknown_name
 from bns.measurements import check_table_name
+from bns.physics.model import Model
 from bns.robots import load_robot
 from bns.robots.simulator import StaticSimulator, check_writable, save_simulator
 from bns.spec import FIELDS, RADII_CM, RunSpec
@@ -163,12 +164,12 @@ def run(
         **parameters: all else, such as mutation_rate=0.2, evaluations=50 (`Parameters`).
 
     Raises:
-        SpecError: an unknown parameter, or a value that is not allowed.
+        SpecError: an unknown parameter, or a value that is not allowed, such as a model in memory as the world.
         ModelError: a model or table that cannot be used.
         StoreError: the run cannot be stored in that folder.
         DeviceError: there is no such GPU.
     """
-    given = {"robot": robot, "task": task or default_task(load_robot(robot).name), "world": str(world), "seed": seed}
+    given = {"robot": robot, "task": task or default_task(load_robot(robot).name), "world": _named(world), "seed": seed}
     return run_spec(
         spec_of(given | dict(parameters)),
         keep=keep,
@@ -176,6 +177,17 @@ def run(
         device=device,
         progress=progress,
         on_evaluation=on_evaluation,
+    )
+
+
+def _named(world: Any) -> str:
+    """The name or the file of a world; SpecError for anything else, since a run's name must say which world it was in."""
+    if isinstance(world, str | PathLike):
+        return fspath(world)
+    what = f"the model {world.name} in memory" if isinstance(world, Model) else f"given as {type(world).__name__}"
+    raise SpecError(
+        f"world is {what}; give a name (substitute, physics) or the file of a model: model.save('mine.yaml'), then "
+        "world='mine.yaml'. For a robot that changes during the run: world='physics>mine.yaml@50'."
     )
 
 
