@@ -14,7 +14,7 @@ from bns.api.common.cache import remembered
 from bns.api.common.prepared import Prepared, PreparedNetworks, are_networks, prepared, prepared_networks, these_very
 from bns.api.common.progress import Meter, Progress
 from bns.api.common.provenance import provenance
-from bns.api.common.shown import Shown
+from bns.api.common.shown import Shown, counted
 from bns.api.measurements import Log, Measurements
 from bns.api.model import Given, Model
 from bns.diagnose.adding import known_to, model_yaml
@@ -123,7 +123,7 @@ class CompareResult(Shown):
         c = self.comparison
         near = c.errors[c.near]
         error = f"{1e3 * near['position_m']:.1f} mm off" if near.get("windows") else "nothing to compare"
-        return f"{c.model} on {self.log.name}: {error}, {ahead(c.near)} ahead, {c.trials} trials"
+        return f"{c.model} on {self.log.name}: {error}, {ahead(c.near)} ahead, {counted(c.trials, 'trial')}"
 
 
 @in_force(DEFAULTS)

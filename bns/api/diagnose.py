@@ -18,7 +18,7 @@ from bns.api.common.parameters import parameter_table
 from bns.api.common.prepared import Prepared, prepared, with_effects
 from bns.api.common.progress import Meter, Progress
 from bns.api.common.provenance import provenance
-from bns.api.common.shown import Shown
+from bns.api.common.shown import Shown, counted
 from bns.api.measurements import SAVED, Log, Measurements
 from bns.api.model import Given, Model
 from bns.diagnose.adding import documented
@@ -141,9 +141,9 @@ class DiagnoseResult(Shown):
     def errors(self) -> pd.DataFrame:
         """Position error (m) on held-out trials, before and after on the same windows: one row per horizon.
 
-        Columns before, after (root mean square), median_before, median_after, change, change_low, change_high (95 %, paired
-        by trial), noise_floor (of the tracking), windows, windows_left_out. Of `model`; if there are terms, see
-        `errors_with_terms`.
+        Columns, in m: before, after (root mean square), median_before, median_after, change (after less before, so below 0 is
+        better), change_low, change_high (its 95 % interval, paired by trial), noise_floor (of the tracking). Numbers of windows:
+        windows, windows_left_out. Of `model`; if there are terms, see `errors_with_terms`.
         """
         return pd.DataFrame(self.diagnosis.as_json()["error"]).T.rename_axis("horizon")
 
@@ -209,7 +209,8 @@ class DiagnoseResult(Shown):
 
     def _line(self) -> str:
         lacks = f" ({', '.join(self.effects)})" if self.effects else ""
-        return f"{self.verdict}{lacks}; {self.ready.model.name} on {self.ready.log.name}, {len(self.ready.log)} trials"
+        trials = counted(len(self.ready.log), "trial")
+        return f"{self.verdict}{lacks}; {self.ready.model.name} on {self.ready.log.name}, {trials}"
 
 
 def diagnose(

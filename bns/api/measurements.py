@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bns.api.common.shown import Shown
+from bns.api.common.shown import Shown, counted
 from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.bodies.cycles import CycleTracks
 from bns.diagnose.data.checks import left_out_rows, own_rows, rows_by_trial, rows_of_losses
@@ -256,7 +256,7 @@ class Measurements(Shown):
 
     def _line(self) -> str:
         poses, odd = int(self.trials["poses"].sum()), len(self._measured.findings)
-        return f"{self.name}, {len(self)} trials, {poses} poses, {odd} finding{'' if odd == 1 else 's'}"
+        return f"{self.name}, {counted(len(self), 'trial')}, {counted(poses, 'pose')}, {counted(odd, 'finding')}"
 
     def plot_paths(self, ax: Axes | None = None, trials: Iterable[int] | None = None) -> Axes:
         """Where the robot went, one line per trial, m; ``trials``: which, by their number from 0 (default: all)."""

@@ -17,7 +17,7 @@ from bns.api.common.arguments import as_path, checked_progress
 from bns.api.common.next_command import limits_in_words, noted
 from bns.api.common.progress import Meter, Progress, part
 from bns.api.common.provenance import provenance
-from bns.api.common.shown import Shown
+from bns.api.common.shown import Shown, counted
 from bns.api.diagnose import DiagnoseResult, diagnose
 from bns.api.measurements import Log
 from bns.api.model import Given
@@ -108,7 +108,8 @@ class ProposeResult(Shown):
     def _line(self) -> str:
         minutes = float(self.proposal.plan.lasting_s.sum() / 60)
         models = " / ".join(model.title for model in self.proposal.competing_models)
-        return f"{len(self.proposal.plan)} trials, {minutes:.1f} min, decide with a chance of {self.power:.0%} between {models}"
+        trials = counted(len(self.proposal.plan), "trial")
+        return f"{trials}, {minutes:.1f} min, decide with a chance of {self.power:.0%} between {models}"
 
 
 def propose(

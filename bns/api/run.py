@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from bns.api.common.progress import Progress, silent
-from bns.api.common.shown import Shown
+from bns.api.common.shown import Shown, counted
 from bns.approaches import check_networked
 from bns.bootstrap import loop
 from bns.errors import ModelError, SpecError, unknown_name
@@ -133,7 +133,8 @@ class RunResult(Shown):
 
     def _line(self) -> str:
         s, reached = self.spec, "all goals reached" if self.success else "not all goals reached"
-        return f"{s.robot}, {s.task}, seed {s.seed}, {s.evaluations} evaluations in {self.wall_s:.1f} s: {reached}"
+        evaluations = counted(s.evaluations, "evaluation")
+        return f"{s.robot}, {s.task}, seed {s.seed}, {evaluations} in {self.wall_s:.1f} s: {reached}"
 
 
 def run(

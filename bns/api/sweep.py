@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import numbers
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ import pandas as pd
 import yaml
 
 from bns.api.common.progress import Progress, silent
-from bns.api.common.shown import Shown, plain
+from bns.api.common.shown import Shown, counted, plain
 from bns.errors import SpecError, unknown_name
 from bns.sweep.budget import Budget
 from bns.sweep.confirm import confirmation
@@ -84,7 +85,7 @@ class SweepPlan(Shown):
 
     def _line(self) -> str:
         p = self.plan
-        return f"{p.sweep}, {p.total} runs, {p.done} done, about {p.seconds_estimate:.0f} s with {self.place.where}"
+        return f"{p.sweep}, {counted(p.total, 'run')}, {p.done} done, about {p.seconds_estimate:.0f} s with {self.place.where}"
 
 
 class Sweep(Shown):
@@ -195,9 +196,9 @@ class Sweep(Shown):
 
         Raises:
             StoreError: the results cannot be written, or another process writes this sweep.
-            SpecError: options that exclude each other. ClusterError, DeviceError: machines that cannot be used.
+            SpecError: options that exclude each other or cannot be. ClusterError, DeviceError: machines that cannot be used.
         """
-        told = progress or silent
+        told, jobs = progress or silent, _checked_jobs(jobs)
         share = None if shard is None else Shard.parse(f"{shard[0]}/{shard[1]}")
         request = Request(
             results=Path(results),
@@ -221,7 +222,7 @@ class Sweep(Shown):
 
     def plan(self, results: _Path = "results", *, jobs: int | None = None) -> SweepPlan:
         """What is left to do and what it would take; nothing is written. Without stored runs one short run is timed."""
-        place = load_executor("joblib").placement(Request(results=Path(results), jobs=jobs))
+        place = load_executor("joblib").placement(Request(results=Path(results), jobs=_checked_jobs(jobs)))
         return SweepPlan(forecast(self._described, Path(results), place.workers), place)
 
     def status(self, results: _Path = "results") -> pd.DataFrame:
@@ -244,7 +245,17 @@ class Sweep(Shown):
     def _line(self) -> str:
         d = self._described
         tasks = ", ".join(d.runs_by_task())
-        return f"{d.name}: {d.robot}, {tasks}; {len(d.combos)} combinations on {d.seeds} seeds, {d.total} runs"
+        many = f"{counted(len(d.combos), 'combination')} on {counted(d.seeds, 'seed')}, {counted(d.total, 'run')}"
+        return f"{d.name}: {d.robot}, {tasks}; {many}"
+
+
+def _checked_jobs(jobs: Any) -> int | None:
+    """How many processes, as the command line takes them; SpecError for anything else."""
+    if jobs is None:
+        return None
+    if isinstance(jobs, bool) or not isinstance(jobs, numbers.Integral) or jobs < 1:
+        raise SpecError(f"jobs is {jobs!r}; it must be a whole number of 1 or more, or None for one per core.")
+    return int(jobs)
 
 
 def _parsed(tree: dict[str, Any]) -> Described:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from bns.errors import BnsError
 from bns.plotting.style import COLUMN_IN, style
 
 
@@ -25,7 +26,12 @@ class NotebookAxes(Axes):
 def drawn(
     ax: Axes | None, draw: Callable[[Axes], object], size_in: tuple[float, float] = (COLUMN_IN * 1.4, COLUMN_IN)
 ) -> Axes:
-    """``draw`` onto ``ax`` in its own style; without one onto new axes in the package's style, known to nobody else."""
+    """``draw`` onto ``ax`` in its own style; without one onto new axes in the package's style, known to nobody else.
+
+    BnsError if ``ax`` is no axes.
+    """
+    if ax is not None and not isinstance(ax, Axes):
+        raise BnsError(f"ax is given as {type(ax).__name__}; give one matplotlib Axes (of several, such as axes[0]), or none.")
     if ax is not None:
         draw(ax)
         return ax

@@ -29,6 +29,11 @@ class Shown(ABC):
         return f"<b>{html.escape(self._line())}</b><pre>{html.escape(self.summary())}</pre>"
 
 
+def counted(number: int, what: str) -> str:
+    """``1 trial``, ``2 trials``."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
 def plain(value: Any) -> Any:
     """Values as JSON and YAML know them: numpy's numbers and arrays, tuples and ranges become Python's numbers and lists."""
     if hasattr(value, "tolist"):
