@@ -80,13 +80,27 @@ def in_both(typed: str, python: str) -> str:
     return f"{typed} (in Python: {python})"
 
 
+def one_slip(given: str, name: str) -> bool:
+    """Whether ``given`` is ``name`` but for capitals, or one letter too many, left out, wrong or swapped with the next one."""
+    short, long = sorted((given.lower(), name.lower()), key=len)
+    if short == long:
+        return given != name
+    if len(short) == len(long):
+        wrong = [at for at in range(len(long)) if short[at] != long[at]]
+        swapped = wrong == [wrong[0], wrong[0] + 1] and short[wrong[0] : wrong[0] + 2] == long[wrong[0] : wrong[0] + 2][::-1]
+        return len(wrong) == 1 or swapped
+    return any(long[:at] + long[at + 1 :] == short for at in range(len(long)))
+
+
 def unknown_name(kind: str, given: object, valid: Iterable[str], also: Mapping[str, str] | None = None) -> str:
     """Say that ``given`` is no ``kind``, which one was probably meant, and list the valid names.
 
-    ``also``: other words for valid names, by which somebody may have called them.
+    A name that differs in upper and lower case alone is meant before all others. ``also``: other words for valid names, by which
+    somebody may have called them.
     """
     names, words = sorted(valid), dict(also or {})
-    near = [words.get(one, one) for one in get_close_matches(str(given).lower(), [*words, *names], n=1, cutoff=0.5)]
+    same = [one for one in names if one.lower() == str(given).lower()]
+    near = same[:1] or [words.get(one, one) for one in get_close_matches(str(given).lower(), [*words, *names], n=1, cutoff=0.5)]
     near = near or get_close_matches(str(given), names, n=1, cutoff=0.5)
     hint = f" Did you mean {near[0]!r}?" if near else ""
     return f"unknown {kind} {given!r}.{hint} Valid: {', '.join(names)}."

@@ -17,7 +17,7 @@ from bns.diagnose.data.merge_topics import held, merged, named_topics, of_topics
 from bns.diagnose.data.quaternions import yaw
 from bns.diagnose.data.relative_motions import relative_motions
 from bns.diagnose.data.split_trials import split
-from bns.errors import DataError, unknown_name
+from bns.errors import DataError, one_slip, unknown_name
 from bns.measurements import COLUMNS, COMMANDS, POSE
 
 Reader = Callable[[Path], pd.DataFrame]
@@ -31,6 +31,7 @@ def applied(
     ``folder`` and ``read``: where the files of ``also`` are, and how they are read. DataError where the mapping does not fit.
     """
     rules = located(mapping)
+    _check_slips(table, rules)
     out = _renamed(table, rules["columns"], rules, ("columns",))
     if of_topics(table):
         out = named_topics(out)
@@ -57,6 +58,28 @@ def applied(
     if rules.get("repeated_poses") == "lost":
         out.loc[repeated(out), list(POSE)] = np.nan
     return out[[*(c for c in COLUMNS if c in out.columns), *(c for c in out.columns if c not in COLUMNS)]]
+
+
+def _check_slips(table: pd.DataFrame, rules: LocatedMapping) -> None:
+    """DataError for an entry that is a column of the measurements but for a slip, where nothing else gives that column."""
+    within: list[tuple[str | int, ...]] = [("columns",), *(("also", n, "columns") for n in range(len(rules.get("also", []))))]
+    entries = [rules["columns"], *(other["columns"] for other in rules.get("also", []))]
+    there = {*map(str, table.columns), *(name for columns in entries for name in columns)}
+    missing = [name for name in COLUMNS if name not in there and not (name == "trial" and "trials" in rules)]
+    for place, columns in zip(within, entries, strict=True):
+        for name in columns:
+            meant = next((one for one in missing if _is_slip_of(one, name)), None)
+            if meant is not None:
+                with rules.at(*place, name):
+                    raise DataError(
+                        f"{name} would be a column of your own, and nothing gives {meant}. Did you mean {meant!r}? A column of "
+                        "your own needs a name that is less like it."
+                    )
+
+
+def _is_slip_of(column: str, name: str) -> bool:
+    """Short names differ by one letter anyway (z_m, x_m): of them only capitals are slips."""
+    return one_slip(name, column) and (len(column) >= len("trial") or name.lower() == column.lower())
 
 
 @contextmanager
