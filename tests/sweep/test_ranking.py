@@ -12,6 +12,7 @@ from sweep_jobs import make_sweep
 import bns
 from bns.cli.main import main
 from bns.errors import SpecError
+from bns.spec import RunSpec
 from bns.store.record import RunRecord
 from bns.sweep.confirm import best
 from bns.sweep.expand.grid import parse_sweep
@@ -251,6 +252,34 @@ def test_a_first_round_cut_short_counts_its_runs_and_saves_nothing(tmp_path):
     assert last.endswith(f"; 3 of {sweep.total} runs so far")
 
 
+@pytest.mark.parametrize(
+    ("good", "shown", "said"),
+    [
+        ((), ["tie"] * 10, "circle: places 1 to 10 tie: 2 more combinations have the same success (0.000)"),
+        ((3, 4), ["100.0%"] * 2 + ["tie"] * 8, "circle: places 3 to 10 tie: 2 more combinations have the same success (0.000)"),
+        (range(2, 12), ["100.0%"] * 10, "the 10 best of each task are decided (at 0.95 confidence for each task); "),
+        (range(1, 12), ["tie"] * 10, "circle: places 1 to 10 tie: 1 more combination has the same success (1.000)"),
+    ],
+)
+def test_combinations_that_tie_are_not_said_to_be_decided(tmp_path, good, shown, said):
+    sweep = make_sweep(combos=12)
+    well = {RunSpec(robot="khepera", seed=seed, **sweep.combos[n]).run_id for n in good for seed in sweep.all_seeds}
+
+    def job(spec):
+        done = sweep_jobs.ok(spec)
+        success = np.full_like(done.tables["evals"]["success"], spec.run_id in well)
+        return replace(done, tables={**done.tables, "evals": {**done.tables["evals"], "success": success}})
+
+    def carry_out(part, request):
+        return run_sweep(part, request.results, job=job, executor=SerialExecutor(job))
+
+    _, ranking = run_until_ranked(SimpleNamespace(carry_out=carry_out), sweep, Request(tmp_path))
+    lines = ranking.in_words().splitlines()
+    assert [line.split()[3] for line in lines[1:11]] == shown
+    assert any(line.startswith(said) for line in lines)
+    assert ("decided (" in ranking.in_words()) == ("tie" not in shown)
+
+
 @pytest.mark.slow
 def test_from_the_command_line(tmp_path, capsys):
     """Eleven combinations of tiny runs: what is run has the numbers of the complete sweep, and the ranking is its."""
@@ -258,8 +287,9 @@ def test_from_the_command_line(tmp_path, capsys):
     file.write_text(tiny(11, 2))
     assert main(["sweep", str(file), "--jobs", "1", "--until", "ranking", "--results", str(tmp_path / "a")]) == 0
     said = capsys.readouterr()
-    assert "the 10 best of each task are decided" in said.out
-    assert "100.0%" in said.out
+    assert "the 10 best of each task are decided but for ties (" in said.out  # runs so short never succeed
+    assert "circle: places 1 to 10 tie: 1 more combination has the same success (0.000)" in said.out
+    assert "100.0%" not in said.out
     result = bns.Sweep.from_file(file).run(tmp_path / "a", jobs=1, until="ranking")
     assert (result.counts.new, result.finished, len(result.ranking.best)) == (0, True, 10)
     whole = bns.Sweep.from_file(file).run(tmp_path / "b", jobs=1)

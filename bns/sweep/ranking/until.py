@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from bns.errors import SpecError
 from bns.sweep.confirm import best
@@ -19,17 +21,22 @@ from bns.sweep.runner import Summary
 
 DECIDED = "ranking"
 """What stops a sweep whose best are known."""
+_SAME = 1e-9
 
 
 @dataclass(frozen=True)
 class Ranked:
-    """One of the best: place from 1, parameters, mean success over all seeds, confidence that it is one of them."""
+    """One of the best: place from 1, parameters, mean success over all seeds, confidence that it is one of them.
+
+    ``ties``: how many combinations that are left out have all of their runs and the same success.
+    """
 
     task: str
     place: int
     combination: dict[str, Any]
     success: float
     confidence: float
+    ties: int = 0
 
 
 @dataclass(frozen=True)
@@ -53,14 +60,34 @@ class Ranking:
         lines = [head if self.best else "no combination has all of its runs yet, so none is ranked"]
         for one in self.best:
             told = ", ".join(f"{name} {value}" for name, value in one.combination.items() if name != "task")
-            lines.append(f"{one.task:12} {one.place:5} {one.success:8.3f} {one.confidence:10.1%}  {told}")
-        state = "decided" if not self.open else f"not decided: {self.open} more combinations may be among them"
+            sure = "tie" if one.ties else f"{one.confidence:.1%}"
+            lines.append(f"{one.task:12} {one.place:5} {one.success:8.3f} {sure:>10}  {told}")
+        ties = list(self._ties())
+        state = "decided but for ties" if ties else "decided"
+        state = state if not self.open else f"not decided: {self.open} more combinations may be among them"
         sure = "for certain" if self.aim.confidence == 1.0 else f"at {self.aim.confidence:.4g} confidence for each task"
         lines.append(f"the {BEST} best of each task are {state} ({sure})")
         lines[-1] += f"; {self.runs} of {self.total} runs" + (" so far" if self.open else f", {self.saved:.0%} saved")
         if self.aim.within:
             lines.append(f"what is left out may be better than the last of them by less than {self.aim.within:g} of mean success")
+        lines += ties
         return "\n".join(lines)
+
+
+    def _ties(self) -> Iterator[str]:
+        """Of each task, in words: which places combinations that are left out could have as well."""
+        for task in dict.fromkeys(one.task for one in self.best):
+            level = [one for one in self.best if one.task == task and one.ties]
+            if not level:
+                continue
+            first, last, more = level[0].place, level[-1].place, level[0].ties
+            places = f"place {first} ties" if first == last else f"places {first} to {last} tie"
+            others = "1 more combination" if more == 1 else f"{more} more combinations"
+            has = "has" if more == 1 else "have"
+            yield (
+                f"{task}: {places}: {others} {has} the same success ({level[0].success:.3f}); among equals the success at larger "
+                "distances, then the fitness in the world, then the order of the file chose"
+            )
 
 
 def run_until_ranked(
@@ -108,8 +135,11 @@ def ranking(race: Race, folder: Path, counts: Summary) -> Ranking:
         own = [race.sweep.combos.index(combo) for combo in chosen]
         places = [numbers.index(number) for number in own if number in numbers]
         sure, (mean, _) = confidences(results, places, race.aim), results.bounds()
+        level = np.abs(mean - mean[places[-1]]) < _SAME if places else np.zeros(len(mean), bool)
+        ties = int((level & results.whole).sum() - level[places].sum())
         for at, (place, confidence) in enumerate(zip(places, sure, strict=True), 1):
-            found.append(Ranked(task, at, race.sweep.combos[numbers[place]], float(mean[place]), confidence))
+            ranked = Ranked(task, at, race.sweep.combos[numbers[place]], float(mean[place]), confidence)
+            found.append(replace(ranked, ties=ties) if level[place] else ranked)
     left = sum(int((possible(results, race.aim) & ~results.whole).sum()) for results in race.results.values())
     return Ranking(tuple(found), left, counts.total - counts.remaining, race.sweep.described, race.aim)
 
