@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from bns.diagnose.estimate.plausibility import with_unit
 from bns.diagnose.predict.paired_errors import Change, HorizonErrors, PairedErrors
 from bns.diagnose.report.plain_language import figures_in_words
 from bns.diagnose.report.tables import ahead
@@ -103,7 +104,7 @@ def mm(metres: float) -> str:
 def effect_text(effect: Effect, badges: Sequence[str], numbers: Mapping[str, Mapping[str, Any]], alone: str) -> str:
     """What an effect is, what it looks like, its fitted numbers, what it earns alone, and what to beware of."""
     fitted = "".join(
-        f"<br><b>{escape(name)}</b> = {n['value']:.5g} {escape(n['unit'])} ({_in_words(n)})"
+        f"<br><b>{escape(name)}</b> = {n['value']:.5g}{escape(with_unit(n['unit']))} ({_in_words(n)})"
         for name, n in numbers.items()
         if n["value"] is not None
     )

@@ -19,6 +19,11 @@ NO_WIDER = {"max-width": "calc(100vw - 28px)"}
 """What is wider than the window (a table) scrolls by itself; without this it would push everything beside it out of sight."""
 WIDE: dict[str, Any] = {"sizing_mode": "stretch_width", "styles": NO_WIDER}
 _ON_TOP = "@media (max-width: 720px) { :host { order: -1; } }"
+_IN_VIEW = """
+@media (min-width: 721px) {
+  :host { position: sticky; top: 0; align-self: flex-start; max-height: calc(100vh - 80px); overflow-y: auto; }
+}
+"""
 
 
 def html(text: str = "", **more: Any) -> Any:
@@ -82,12 +87,14 @@ def row(*parts: Any, **more: Any) -> Any:
     return pn.FlexBox(*parts, **{**WIDE, **more})
 
 
-def beside(*parts: Any, least: int = 300, first: Any = None) -> Any:
-    """Parts next to each other where there is room, below each other where there is none, ``first`` on top then."""
+def beside(*parts: Any, least: int = 300, first: Any = None, in_view: bool = False) -> Any:
+    """Parts next to each other where there is room, below each other where there is none.
+
+    ``first`` is on top then. ``in_view``: and stays in view else, however far one scrolls the parts beside it.
+    """
     styles = {"flex": f"1 1 {least}px", "min-width": f"min({least}px, calc(100vw - 28px))", **NO_WIDER}
-    cells = [
-        pn.Column(part, stylesheets=[_ON_TOP] if part is first else [], **{**WIDE, "styles": styles}) for part in parts
-    ]
+    of_first = [_ON_TOP, _IN_VIEW] if in_view else [_ON_TOP]
+    cells = [pn.Column(part, stylesheets=of_first if part is first else [], **{**WIDE, "styles": styles}) for part in parts]
     return pn.Row(*cells, **{**WIDE, "styles": {"flex-wrap": "wrap", "gap": "8px", **NO_WIDER}})
 
 

@@ -316,5 +316,5 @@ class EffectsScreen:
             self._snapshots.view,
             **WIDE,
         )
-        self._body = pn.Column(self._diagnosis.view, beside(left, right, least=330, first=right), **WIDE)
+        self._body = pn.Column(self._diagnosis.view, beside(left, right, least=330, first=right, in_view=True), **WIDE)
         return pn.Column(self._problem.view, self._body, **WIDE)

@@ -72,8 +72,8 @@ class OneEffect:
         low, high = p.plausible
         start, end = (float(v) for v in (min(low, value), max(high, value)) if np.isfinite(v))
         return NumberSlider(
-            f"{p.name} ({p.unit}), by hand",
-            f"{p.name}, {p.unit}",
+            f"{p.name}, by hand" if p.unit == "1" else f"{p.name} ({p.unit}), by hand",
+            p.name if p.unit == "1" else f"{p.name}, {p.unit}",
             value,
             (start, end),
             _STEPS,
