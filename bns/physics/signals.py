@@ -56,7 +56,9 @@ class Logged(Mapping[str, Array]):
 class Conditions:
     """What else was logged at each step, (batch, steps); None where it was not.
 
-    ``battery_drop_v`` is the voltage below the first one that was logged; ``logged``: any further column by its name.
+    session_s: time since the session began, s. battery_drop_v: voltage below the first one that was logged, V. seen: tracked x_m,
+    y_m (m), heading_rad (rad, unwrapped) between frames, (batch, steps, 3). logged: any further column by its name, as it was
+    logged.
     """
 
     session_s: Array | None = None
@@ -71,7 +73,15 @@ NO_CONDITIONS = Conditions()
 
 @dataclass(frozen=True)
 class Wheels:
-    """Stage ``wheel``: mean speeds of the two wheels' surfaces in m/s, at rest before the first step."""
+    """Stage ``wheel``: mean speeds of the two wheels' surfaces, at rest before the first step.
+
+    An effect returns them changed, with `turning` (or `following`, if it makes the wheels late). Arrays are (batch, steps).
+
+    step_s: how long each step lasts, s; 0 pads a short trial. left_m_s, right_m_s: mean speed of a wheel's surface over the step,
+    m/s; at first those that were commanded. wheelbase_m: distance of the wheels, m. conditions: what else was logged
+    (`Conditions`). followed: how far, 0 to 1, what acts only while the robot moves has come; None where wheels are not late.
+    To look at, too: moving (0 to 1), session_s, trial_s (s), places (n, 2) (m), logged.
+    """
 
     step_s: Array
     left_m_s: Array
@@ -127,11 +137,16 @@ class Wheels:
 
 @dataclass(frozen=True)
 class Body:
-    """Stage ``body``: velocities in the robot's frame; ``moving`` runs from 0 (wheels at rest) to 1.
+    """Stage ``body``: velocities in the robot's frame.
 
-    ``left_m_s``, ``right_m_s`` and ``session_s`` are for effects to look at: what the wheels do, and when.
+    An effect returns them changed, with `dataclasses.replace`, `with_added`, `scaled` or `with_drift`. Arrays are (batch, steps).
 
-    ``sideways_m_s`` is positive to the right, ``yaw_rad_s`` counter-clockwise.
+    forward_m_s, sideways_m_s (positive to the right), m/s, and yaw_rad_s (counter-clockwise), rad/s: mean velocities over the
+    step; these are what an effect changes. All else is to look at. moving: from 0 (wheels at rest) to 1. left_m_s, right_m_s:
+    what the wheels do, m/s. session_s: time since the session began, s. place: where the robot is in each step, (batch, steps,
+    3): x_m, y_m (m), heading_rad (rad); None while nobody knows, where an effect with ``needs_place=True`` returns the body as
+    it is. wheelbase_m: distance of the wheels, m. step_s: how long each step lasts, s. conditions: what else was logged
+    (`Conditions`); its further columns are in logged, too.
     """
 
     forward_m_s: Array
@@ -179,6 +194,9 @@ class Body:
 class Flow:
     """Stage ``world``: velocity added while the wheels turn, x_m_s - return_per_s·x; so for y.
 
+    x_m_s, y_m_s: along the axes of the floor, m/s. return_per_s: share of the distance from the origin that the robot is drawn
+    back in a second, 1/s. Plain numbers, to which an effect adds its own (`dataclasses.replace`).
+
     Affine in the position, so that any number of effects add up in any order and the step is solved exactly.
     """
 
@@ -189,7 +207,11 @@ class Flow:
 
 @dataclass(frozen=True)
 class Stamps:
-    """Stage ``clock``: when the poses were really taken, any shape; begins as the times they are stamped with."""
+    """Stage ``clock``: when the poses were really taken.
+
+    t_s: time since the trial began, s, of any shape; begins as the times that the poses are stamped with. heading_late_s: how
+    long before that their headings were, s.
+    """
 
     t_s: Array
     heading_late_s: float = 0.0
@@ -198,6 +220,9 @@ class Stamps:
 
 @dataclass(frozen=True)
 class View:
-    """Stage ``measure``: poses as the tracker reports them, (..., 3): x_m, y_m, heading_rad."""
+    """Stage ``measure``: poses as the tracker reports them.
+
+    poses: (..., 3), that is x_m, y_m (m), heading_rad (rad, counter-clockwise from x).
+    """
 
     poses: Array
