@@ -51,7 +51,7 @@ class Platform(Protocol):
         """
 
     def readings(self) -> dict[str, float]:
-        """Voltages, temperatures: name with unit -> value."""
+        """Voltages, temperatures: name with unit -> value; TrialPausedError if they do not allow another drive."""
 
     def stop(self) -> Stop:
         """Stop and confirm; never raises."""

@@ -15,7 +15,7 @@ from bns.hardware.link.serial_link import SerialLink
 from bns.hardware.rig import Rig
 from bns.hardware.safety import Stopping, StopsAtTheEnd
 from bns.hardware.tracking.kinds import open_tracker
-from bns.hardware.wheels.khepera import BAUD, STILL_M_S, WHEELBASE_M, KheperaIII, check_battery, firmware
+from bns.hardware.wheels.khepera import BAUD, FLAT_V, STILL_M_S, WHEELBASE_M, KheperaIII, check_battery, firmware
 from bns.hardware.wheels.khepera_settings import khepera_settings
 from bns.hardware.wheels.wheel_drive import RobotLostError
 from bns.hardware.wheels.wheeled import WheeledPlatform, Wheels
@@ -23,7 +23,7 @@ from bns.robots.khepera import UNITS_PER_M_S
 
 RIG = resources.files("bns.hardware") / "rigs" / "khepera.yaml"
 
-WHEELS = Wheels(UNITS_PER_M_S, 1000.0, WHEELBASE_M)
+WHEELS = Wheels(UNITS_PER_M_S, 1000.0, WHEELBASE_M, least_v=FLAT_V)
 REPEATS = 1
 """How often a trial drives its final controller by default: the dissertation shows one drive of it (section 4.3)."""
 

@@ -18,6 +18,7 @@ from bns.hardware.link.reply_time import ReplyTime
 from bns.hardware.link.serial_link import NoReplyError
 from bns.hardware.stop import Stop
 from bns.hardware.wheels.wheel_drive import RobotLostError
+from bns.hardware.wheels.wheeled import flat_text
 
 BAUD = 115200
 ATTEMPTS = 4
@@ -32,7 +33,7 @@ WHEELBASE_M = 0.0884
 """Between the wheels, published."""
 HIGHEST_UNITS = 43_000
 """End of the range that the firmware regulates."""
-_FLAT_V = 6.0
+FLAT_V = 6.0
 _SPEEDS = r"e,(-?\d+),(-?\d+)"
 
 
@@ -166,5 +167,5 @@ class KheperaIII:
 
 def check_battery(volts: float) -> None:
     """HardwareError if the battery is too low to begin with."""
-    if volts < _FLAT_V:
-        raise HardwareError(f"the battery is at {volts:.1f} V; charge it to {_FLAT_V:g} V or more first.")
+    if volts < FLAT_V:
+        raise HardwareError(flat_text(volts, FLAT_V))

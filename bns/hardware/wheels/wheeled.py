@@ -50,6 +50,12 @@ class WheelDriver(Protocol):
         """Give the link free."""
 
 
+def flat_text(volts: float, least_v: float) -> str:
+    """That a battery is too low, its voltage with as many digits as show that."""
+    shown = next((text for digits in range(1, 5) if float(text := f"{volts:.{digits}f}") < least_v), f"{volts}")
+    return f"the battery is at {shown} V; charge it to {least_v:g} V or more first."
+
+
 @dataclass(frozen=True)
 class Wheels:
     """The robot's numbers: of its commands' speed for one metre per second, of their duration for one second; wheelbase."""
@@ -60,6 +66,8 @@ class Wheels:
     heartbeat_looks: int = 5
     """Every so many looks (a tenth of a second each) the robot is asked for its speed. A robot that stops by itself when it hears
     nothing for half a second needs 2."""
+    least_v: float = 0.0
+    """Nothing is driven on a battery below this voltage."""
 
 
 class WheeledPlatform:
@@ -91,12 +99,14 @@ class WheeledPlatform:
         return None if sight is None else sight.pose
 
     def readings(self) -> dict[str, float]:
-        """Battery."""
+        """Battery; TrialPausedError if it is too low for another drive."""
         try:
             volts = self._driver.battery_v()
-            return {} if math.isnan(volts) else {"battery_v": volts}
         except RobotLostError as error:
             raise TrialPausedError(f"the robot is lost: {error}") from error
+        if volts < self._wheels.least_v:
+            raise TrialPausedError(flat_text(volts, self._wheels.least_v))
+        return {} if math.isnan(volts) else {"battery_v": volts}
 
     def stop(self) -> Stop:
         """Stop; confirmed by the wheels, and by the tracker where it sees the robot: wheels may say that they stand, and turn."""
