@@ -145,9 +145,9 @@ class ServoBus:
         low, high = self.read(servo, "cw_angle_limit"), self.read(servo, "ccw_angle_limit")
         wide = not narrow(number, (low, high), table, GREATEST_RAD)
         yield Finding(wide, f"servo {number}: angle limits {low} to {high}", "" if wide else f"90° to both sides: {mend}")
-        volts, limits = self.read(servo, "present_voltage") / 10, limits_of(table)
+        volts, limits, (least_v, most_v) = self.read(servo, "present_voltage") / 10, limits_of(table), table.volts
         fed = limits.low_v <= volts <= limits.high_v
-        supply = f"a supply of {limits.low_v:g} to {limits.high_v:g} V; the makers allow {table.volts[1]:g} V"
+        supply = f"a supply of {limits.low_v:g} to {limits.high_v:g} V; the makers allow {least_v:g} to {most_v:g} V"
         yield Finding(fed, f"servo {number}: {volts:.1f} V", "" if fed else supply)
 
     def _alarm(self, servo: OnTheBus, table: ServoTable) -> str:

@@ -65,7 +65,7 @@ def snake_settings(driver: Mapping[str, Any]) -> SnakeSettings:
 
 def limits_of(table: ServoTable) -> ServoLimits:
     """What servos of this model must keep, unless a rig says otherwise."""
-    return ServoLimits(low_v=max(ServoLimits.low_v, table.volts[0]), high_v=table.volts[1] + _CHARGED_V)
+    return ServoLimits(low_v=table.volts[0], high_v=table.volts[1] + _CHARGED_V)
 
 
 def _table(driver: Mapping[str, Any]) -> ServoTable:

@@ -135,7 +135,7 @@ def test_thirteen_volts_are_refused(bus, capsys):
     servos[0].put("present_voltage", 130)
     code, said = call(capsys, "check", "--port", port)
     assert code == 2
-    assert "BAD  servo 1: 13.0 V\n     try: a supply of 9 to 12.5 V; the makers allow 12 V" in said.out
+    assert "BAD  servo 1: 13.0 V\n     try: a supply of 9 to 12.5 V; the makers allow 9 to 12 V" in said.out
     with pytest.raises(HardwareError, match=r"high_v is 13; the servos' makers allow 12 V"):
         snake_settings({"high_v": 13})
 

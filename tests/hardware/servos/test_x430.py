@@ -213,7 +213,14 @@ def test_an_overload_is_named_and_stays_until_the_servo_is_rebooted(chain, clock
 
 @pytest.mark.parametrize(
     ("kind", "decivolts", "said"),
-    [(XL430_W250, 130, "13.0 V, not 9 to 12.5"), (XM430_W350, 148, ""), (XM430_W350, 96, "9.6 V, not 10 to 15.3")],
+    [
+        (XL430_W250, 64, "6.4 V, not 6.5 to 12.5"),
+        (XL430_W250, 65, ""),
+        (XL430_W250, 74, ""),
+        (XL430_W250, 130, "13.0 V, not 6.5 to 12.5"),
+        (XM430_W350, 148, ""),
+        (XM430_W350, 96, "9.6 V, not 10 to 15.3"),
+    ],
 )
 def test_voltages_are_those_of_the_model(chain, kind, decivolts, said):
     driver, *_ = chain(kind=kind, present_voltage=decivolts)
@@ -286,6 +293,13 @@ def test_the_guard_stops_by_the_bytes_of_the_driver_and_confirms_by_what_servos_
     driver.stop()
     assert order.is_in(heard[0])
     assert heard[0].startswith(order.steps[0][0])
+
+
+def test_a_rig_may_narrow_the_voltages_of_its_model():
+    driver = {"protocol": 2, "model": "XL430-W250"}
+    narrowed = snake_settings({**driver, "low_v": 10.5, "high_v": 11.5}).limits
+    assert (narrowed.low_v, narrowed.high_v) == (10.5, 11.5)
+    assert snake_settings({}).limits.low_v == 9.0
 
 
 @pytest.mark.parametrize(

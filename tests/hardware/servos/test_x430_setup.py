@@ -70,8 +70,11 @@ def test_check_names_what_is_not_fit_and_mends_it(bus, capsys):
     code, said = call(capsys, "check", "--fix", "--port", port)
     assert (code, said.out.splitlines()[-1]) == (0, "all fine")
     assert "status_return, return_delay, operating_mode, cw_angle_limit written" in said.err
-    servo.put("present_voltage", 130)
-    assert "a supply of 9 to 12.5 V; the makers allow 12 V" in call(capsys, "check", "--port", port)[1].out
+    servo.put("present_voltage", 74)  # a battery of two cells
+    assert call(capsys, "check", "--port", port)[0] == 0
+    for decivolts in (64, 130):
+        servo.put("present_voltage", decivolts)
+        assert "a supply of 6.5 to 12.5 V; the makers allow 6.5 to 12 V" in call(capsys, "check", "--port", port)[1].out
 
 
 def test_a_new_servo_is_said_to_need_the_rate_of_a_chain(bus, capsys):
