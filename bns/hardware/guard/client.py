@@ -20,14 +20,13 @@ import numpy as np
 
 from bns.errors import HardwareError, StopNotConfirmedError
 from bns.hardware.clock import RealClock
+from bns.hardware.guard.holder import CODE
 from bns.hardware.guard.recipe import StopRecipe
 from bns.hardware.link.serial_link import no_port, why_not_opened
 from bns.hardware.platform import Driven, Platform
 from bns.hardware.safety import Stopping
 from bns.hardware.stop import Stop
 
-_CODE = "import sys; sys.path.append(sys.argv[1]); from guard.process import main; main()"
-"""What the process runs: this folder as a package by itself, found after the standard library."""
 _FOLDER = Path(__file__).parent
 _BEAT_S = 0.02
 _READY_S = 10.0
@@ -48,7 +47,7 @@ class _Process(NamedTuple):
     def begun(cls) -> Self:
         """A new one; it ends when the socket is closed."""
         control, far = socket.socketpair()
-        script = [sys.executable, "-I", "-S", "-c", _CODE, str(_FOLDER.parent)]
+        script = [sys.executable, "-I", "-S", "-c", CODE, str(_FOLDER.parent), str(os.getpid())]
         with far:
             process = subprocess.Popen(
                 script, stdin=far.fileno(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True

@@ -52,7 +52,6 @@ class Guard:
 
     def run(self) -> None:
         """Until the trial has said goodbye, or is gone, and the robot stands."""
-        signal.signal(signal.SIGTERM, self._terminate)
         while not (self._gone and (self._done or not self.why)):
             self._turn(TICK_S)
             self._judge()
@@ -74,7 +73,8 @@ class Guard:
                 time.sleep(TICK_S)
 
     def ready(self) -> None:
-        """Say so, and what is at the port."""
+        """Say so, and what is at the port. From then on the robot may move, so that no SIGTERM ends this."""
+        signal.signal(signal.SIGTERM, self._terminate)
         self._control.sendall((json.dumps({"kind": "ready", "identity": self._line.identity}) + "\n").encode())
 
     def close(self) -> None:

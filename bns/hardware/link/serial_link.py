@@ -11,6 +11,7 @@ from pathlib import Path
 from bns.errors import HardwareError
 from bns.extras import extra
 from bns.hardware.clock import Clock
+from bns.hardware.guard.holder import holder_text
 from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.link.reply_time import GRANULARITY_S, ReplyLimits, ReplyTime
 from bns.hardware.link.terminal_error import TerminalError
@@ -143,7 +144,8 @@ def why_not_opened(port: str, error: OSError) -> str:
             "sudo usermod -aG dialout $USER), log in again."
         )
     if error.errno in {errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK}:
-        return f"{port} is in use by another program (ModemManager, a terminal, another trial). End that one first."
+        other = f"{port} is in use by another program (ModemManager, a terminal, another trial). End that one first."
+        return holder_text(port) or other
     return f"{port} cannot be opened: {error}. Is it a serial port, and is the robot paired? Try: bns doctor"
 
 

@@ -25,6 +25,7 @@ from bns.hardware.guard import client as guard_client
 from bns.hardware.guard import process as guard_process
 from bns.hardware.guard import signs
 from bns.hardware.guard.client import Guard, GuardedClock, GuardedPlatform
+from bns.hardware.guard.holder import CODE
 from bns.hardware.guard.order import StopOrder
 from bns.hardware.guard.recipe import bridge_recipe, bus_recipe, khepera_recipe
 from bns.hardware.link.hardware_log import HardwareLog
@@ -406,7 +407,7 @@ def test_a_port_in_use_is_named(tmp_path):
 def test_a_guard_needs_no_package(tmp_path):
     """It starts with the standard library alone, in a process that has nothing to import from."""
     folder = Path(guard_process.__file__).parent.parent
-    code = guard_client._CODE.replace("main()", "assert not [name for name in sys.modules if name.startswith('bns')]")
+    code = CODE.replace("main()", "assert not [name for name in sys.modules if name.startswith('bns')]")
     subprocess.run([sys.executable, "-I", "-S", "-c", code, str(folder)], check=True, cwd=tmp_path)
 
 

@@ -1,0 +1,82 @@
+"""A port that is in use by a guard: which one, whose, and what to do."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from bns.cli.main import main
+from bns.errors import HardwareError
+from bns.hardware.clock import RealClock
+from bns.hardware.guard.client import Guard
+from bns.hardware.guard.holder import holder_text
+from bns.hardware.guard.recipe import khepera_recipe
+from bns.hardware.link.serial_link import open_port
+
+RECIPE = khepera_recipe(115200, 720)
+DIES = """
+import os, sys
+from tests.hardware.guard.test_holder import RECIPE, Guard
+guard = Guard(sys.argv[1], RECIPE, 0.3)
+guard.arm()
+os.write(1, str(guard.process).encode())
+os._exit(4)
+"""
+
+
+@pytest.fixture
+def port():
+    """A line at whose other end nobody answers."""
+    near, far = os.openpty()
+    yield os.ttyname(far)
+    os.close(near)
+    os.close(far)
+
+
+@pytest.fixture
+def left_behind(port):
+    """The process of a guard whose trial has ended while its robot may move."""
+    root = Path(__file__).parents[3]
+    done = subprocess.run([sys.executable, "-c", DIES, port], cwd=root, stdout=subprocess.PIPE, timeout=60, check=False)
+    guard = int(done.stdout)
+    yield guard
+    with suppress(ProcessLookupError):
+        os.kill(guard, signal.SIGKILL)
+
+
+def test_a_guard_without_a_trial_is_named_and_how_to_end_it(port, left_behind, capsys):
+    os.kill(left_behind, signal.SIGTERM)  # which is to make it stop the robot, not to end it
+    time.sleep(0.3)
+    with pytest.raises(HardwareError) as said:
+        open_port(port, 115200, RealClock())
+    assert f"is in use by the guard (process {left_behind}) of a trial that has ended" in str(said.value)
+    assert f"Cut its power; then end the guard: kill -9 {left_behind}" in str(said.value)
+    assert main(["servos", "scan", "--port", port]) == 2
+    assert f"kill -9 {left_behind}" in capsys.readouterr().err
+    os.kill(left_behind, signal.SIGKILL)
+    end_s = time.monotonic() + 5.0
+    while holder_text(port) and time.monotonic() < end_s:
+        time.sleep(0.02)
+    open_port(port, 115200, RealClock()).close()
+
+
+def test_a_trial_that_goes_on_is_named(port):
+    guard = Guard(port, RECIPE, 0.3)
+    try:
+        with pytest.raises(HardwareError) as said:
+            open_port(port, 115200, RealClock())
+        assert holder_text("/dev/zero") == ""
+    finally:
+        guard.close()
+    assert f"is in use by another trial (process {os.getpid()}; its guard is process {guard.process})" in str(said.value)
+    assert "kill" not in str(said.value)
+
+
+def test_no_guard_and_no_list_of_processes(port, tmp_path):
+    assert holder_text(port) == ""
+    assert holder_text(port, tmp_path) == ""
