@@ -8,7 +8,7 @@
 const uint8_t DIRECTION = 2;
 const uint8_t MOST_SERVOS = 16;
 const uint8_t VERSION = 4;
-const uint32_t WATCHDOG_MS = 500, TORN_MS = 50, RAMP_MS = 50, ANSWER_US = 3000;
+const uint32_t WATCHDOG_MS = 500, TORN_MS = 50, RAMP_MS = 50, OFF_MS = 20, ANSWER_US = 3000;
 
 const uint8_t START = 0xA5, HELLO = 1, ARM = 2, MOVE = 3, STATE = 4, STOP = 5, ANSWER = 0x80, REFUSED = 0xFF;
 const uint8_t NO_ANSWER = 0x80, RESTARTED = 0xC0;  // in a servo's error byte
@@ -18,10 +18,12 @@ const uint8_t ANGLE_LIMITS = 6, TORQUE_ENABLE = 24, GOAL = 30, TORQUE_LIMIT = 34
 // Instructions of its protocol. Beware of short names: those of the chip's registers (PING is port G's) are macros.
 const uint8_t READ = 2, WRITE = 3, BROADCAST = 254;
 const uint8_t RAMP_STEPS = 4, TRIES = 3, LONGEST_STATUS = 6 + 20;
+const uint16_t OFF_TRIES = 3000;  // a minute: a servo that is deaf for longer has no power, or no cable
 
 uint8_t frame[4 + 255 + 2], back[7 * MOST_SERVOS], servos = 0, ramp = RAMP_STEPS, grown = 0;
 uint16_t held = 0, low[MOST_SERVOS], high[MOST_SERVOS], torque = 0;
-uint32_t heardMs = 0, byteMs = 0, rampMs = 0;
+uint16_t kept = 0, offTries = 0;  // a bit for each servo that has not said yet that its torque is off; how often it was told so
+uint32_t heardMs = 0, byteMs = 0, rampMs = 0, offMs = 0;
 bool armed = false;
 
 uint16_t crc16(const uint8_t *data, uint16_t count) {
@@ -136,6 +138,29 @@ void stopAll() {
   }
   back[0] = left;
   back[1] = left >> 8;
+  kept = left;
+  offTries = 0;
+}
+
+// A stop does not end with one attempt: a servo may have been deaf just then, and a computer that is gone does not repeat it.
+// So each servo that has not said that its torque is off is told again until it does, or OFF_TRIES times in all. One servo
+// each time, asked once, and a pause of OFF_MS, so that frames of the computer are answered in between.
+void repeatStop() {
+  static uint8_t last = 0;
+  if (!kept || millis() - offMs < OFF_MS) return;
+  offMs = millis();
+  if (offTries++ == OFF_TRIES) {
+    kept = 0;
+    return;
+  }
+  do last = (last + 1) % MOST_SERVOS;
+  while (!(kept & (uint16_t)1 << last));
+  const uint8_t off[] = {TORQUE_ENABLE, 0}, what[] = {TORQUE_ENABLE, 1};
+  uint8_t now = 1;
+  say(last + 1, WRITE, off, 2);
+  hear(last + 1, 0, 0);
+  say(last + 1, READ, what, 2);
+  if (hear(last + 1, &now, 1) >= 0 && !now) kept &= ~((uint16_t)1 << last);
 }
 
 // Torque grows in steps, so that nothing jerks; goals are where the joints are.
@@ -146,6 +171,7 @@ bool arm(uint8_t percent) {
     if (!good || !writeGoal(i + 1, word16(here), 1)) return false;
   }
   torque = (uint32_t)1023 * percent / 100;
+  kept = 0;
   ramp = grown = 0;
   armed = true;
   return true;
@@ -268,5 +294,6 @@ void setup() {
 void loop() {
   listen();
   grow();
+  repeatStop();
   if (armed && millis() - heardMs > WATCHDOG_MS) stopAll();
 }
