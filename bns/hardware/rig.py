@@ -18,8 +18,11 @@ from bns.safe_yaml import Lines, read_yaml, shown, text_of
 PLACED_RAD = 0.35
 """Twenty degrees: as hands place a robot, and no further."""
 _NEEDED = ("robot", "port", "surface_m", "tracker")
-_TIMES = ("lost_s", "picture_s", "disagree_s", "late_s", "silent_s", "gives_up_s")
-_KEYS = (*_NEEDED, *_TIMES, "placed_within_m", "placed_within_rad", "driver")
+_MOST_S = {"lost_s": 10.0, "picture_s": 10.0, "disagree_s": 10.0, "late_s": 30.0, "silent_s": 30.0, "gives_up_s": 7 * 86400.0}
+"""More would be no limit: a robot drives metres meanwhile. Most likely it was meant in milliseconds."""
+_MOST_M = 100.0
+"""A longer surface was most likely meant in centimetres or millimetres."""
+_KEYS = (*_NEEDED, *_MOST_S, "placed_within_m", "placed_within_rad", "driver")
 
 
 @dataclass(frozen=True)
@@ -86,7 +89,7 @@ def _rig(content: Mapping[str, Any], where: str, lines: Lines) -> Rig:
         raise HardwareError(
             f"{at['tracker']}: tracker is {shown(tracker)}; it needs a kind ({', '.join(TRACKERS.names())}) and its settings."
         )
-    numbers = {name: _positive(at[name], name, content[name]) for name in _TIMES if name in content}
+    numbers = {name: _seconds(at[name], name, content[name]) for name in _MOST_S if name in content}
     limits = Limits(_surface(at["surface_m"], content["surface_m"]), **numbers)
     near_m = _positive(at.get("placed_within_m", where), "placed_within_m", content.get("placed_within_m", 0.1))
     near_rad = _positive(at.get("placed_within_rad", where), "placed_within_rad", content.get("placed_within_rad", PLACED_RAD))
@@ -108,6 +111,9 @@ def _surface(where: str, given: Any) -> Surface:
     ordered = surface.x_low_m < surface.x_high_m and surface.y_low_m < surface.y_high_m
     if not ordered or not all(map(math.isfinite, sides)):
         raise HardwareError(f"{where}: surface_m is {shown(given)}; the first number of x and of y must be the smaller one.")
+    longest_m = max(surface.x_high_m - surface.x_low_m, surface.y_high_m - surface.y_low_m)
+    if longest_m > _MOST_M:
+        raise HardwareError(f"{where}: surface_m is {longest_m:g} m long; at most {_MOST_M:g}. Its numbers are in metres.")
     return surface
 
 
@@ -115,6 +121,14 @@ def _side(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise TypeError(f"{value!r} is no number")
     return float(value)
+
+
+def _seconds(where: str, name: str, value: Any) -> float:
+    seconds = _positive(where, name, value)
+    if seconds > _MOST_S[name]:
+        most = f"at most {_MOST_S[name]:g} s. It is in seconds, not milliseconds."
+        raise HardwareError(f"{where}: {name} is {shown(value)} s; {most}")
+    return seconds
 
 
 def _positive(where: str, name: str, value: Any) -> float:

@@ -29,6 +29,8 @@ _READINGS = 2
 """The protocol has no checksum: one reading can be garbled into a zero, two in a row hardly."""
 _OBEYS_S = 0.2
 """An order to stop that shows no effect for so long is given again."""
+_SILENT_S = 0.5
+"""A robot that has answered so lately is no lost link, whatever its last question came to."""
 WHEELBASE_M = 0.0884
 """Between the wheels, published."""
 HIGHEST_UNITS = 43_000
@@ -120,6 +122,7 @@ class KheperaIII:
         takes nothing away from it. It is tried for `patience_s`, or as long as the rig says.
         """
         began_s, acknowledged_s, ordered_s, still = self._clock.now_s(), None, -math.inf, 0
+        turned_s, problem = -math.inf, "one reading of still wheels is none"
         patience_s = self._stop_s if patience_s is None else patience_s
         while True:
             timeout_s = self._link.times.timeout_s
@@ -128,10 +131,13 @@ class KheperaIII:
                     self._once(b"D,l0,l0", "d", timeout_s, again=True)
                     ordered_s = self._clock.now_s()
                     acknowledged_s = acknowledged_s or ordered_s - began_s
-                still, problem = (still + 1 if self._stands(timeout_s) else 0), "the wheels still turn"
+                still = still + 1 if self._stands(timeout_s) else 0
+                turned_s = turned_s if still else self._clock.now_s()
             except NoReplyError as error:
                 problem = str(error)
             lasted_s = self._clock.now_s() - began_s
+            if self._clock.now_s() - turned_s < _SILENT_S:
+                problem = "the wheels still turn"
             if still == _READINGS:
                 return self._stopped(Stop(True, lasted_s, acknowledged_s))
             if lasted_s > patience_s:

@@ -1,6 +1,7 @@
 """What counts as a confirmed stop, against a robot whose every answer is written down here."""
 
 import itertools
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 
 from bns.hardware.link.hardware_log import HardwareLog, events
 from bns.hardware.link.reply_time import ReplyTime
+from bns.hardware.link.serial_link import NoReplyError
 from bns.hardware.platform import Driven
 from bns.hardware.rig import shipped_rig
 from bns.hardware.servos.servo_chain import Health, ServoError, ServoLimits
@@ -58,6 +60,24 @@ def test_a_stop_with_one_wheel_turning_is_none(speeds):
     stop, _ = stopped(itertools.repeat(speeds))
     assert not stop.confirmed
     assert "still turn" in stop.problem
+
+
+@pytest.mark.parametrize(("silent_s", "said"), [(0.3, "the wheels still turn"), (0.7, "no answer to b'E")])
+def test_wheels_that_turn_are_said_to_though_the_last_question_was_cut_off(silent_s, said):
+    clock = Ticking()
+    link = Scripted(clock, itertools.repeat((TURNS, TURNS)))
+    answered = link.exchange
+
+    def exchange(request, timeout_s, again=False):
+        if clock.t_s > 1.0 - silent_s:
+            clock.t_s += 0.01
+            raise NoReplyError(f"no answer to {request!r} within {timeout_s:.2g} s")
+        return answered(request, timeout_s, again)
+
+    link.exchange = exchange
+    stop = KheperaIII(link, clock, HardwareLog(None, clock)).stop(0.98)
+    assert not stop.confirmed
+    assert re.match(said, stop.problem)
 
 
 def test_one_reading_of_still_wheels_is_none():

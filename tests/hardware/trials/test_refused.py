@@ -50,6 +50,13 @@ def test_bad_input_is_named(tmp_path, monkeypatch, capsys, arguments, message):
         ({"prot": 1}, "unknown key 'prot'. Did you mean 'port'"),
         ({"tracker": {}}, "it needs a kind"),
         ({"lost_s": -1}, "lost_s is -1; it must be a number above 0"),
+        ({"lost_s": 500}, "lost_s is 500 s; at most 10 s. It is in seconds, not milliseconds"),
+        ({"picture_s": 250}, "picture_s is 250 s; at most 10 s"),
+        ({"disagree_s": 500}, "disagree_s is 500 s; at most 10 s"),
+        ({"late_s": 1000}, "late_s is 1000 s; at most 30 s"),
+        ({"silent_s": 300}, "silent_s is 300 s; at most 30 s"),
+        ({"gives_up_s": 14400000}, "gives_up_s is 14400000 s; at most 604800 s"),
+        ({"surface_m": {"x": [-90, 90], "y": [-1, 1]}}, "surface_m is 180 m long; at most 100. Its numbers are in metres"),
         ({"port": "/dev/nowhere"}, "there is no port /dev/nowhere"),
     ],
 )
