@@ -64,7 +64,7 @@ class Agreement:
     """Of a robot on two wheels. What is seen may differ from what was ordered for `disagree_s`, then the trial pauses."""
 
     def __init__(self, disagree_s: float, wheelbase_m: float) -> None:
-        self._disagree_s, self._wheelbase_m = disagree_s, wheelbase_m
+        self._disagree_s, self.wheelbase_m = disagree_s, wheelbase_m
         self._orders: list[tuple[float, float, float]] = []
         self._seen: deque[_Seen] = deque()
         self._scene = SameScene()
@@ -120,7 +120,7 @@ class Agreement:
         if off_m > _OFF_M + _SHARE * way_m:
             return f"the robot is seen {100 * off_m:.0f} cm from where its commands lead in {last.t_s - first.t_s:.1f} s"
         off_rad = abs(math.remainder(expected[2] - last.pose[2], 2.0 * math.pi))
-        if off_rad > _OFF_RAD + max(_SHARE * turn_rad, _WHEELS_APART * way_m / self._wheelbase_m):
+        if off_rad > _OFF_RAD + max(_SHARE * turn_rad, _WHEELS_APART * way_m / self.wheelbase_m):
             return f"the robot is seen turned {math.degrees(off_rad):.0f}° from where its commands lead"
         return ""
 
@@ -143,7 +143,7 @@ class Agreement:
         x_m, y_m, heading_rad = (float(v) for v in begin.pose)
         way_m = turned_rad = 0.0
         for lasts_s, left, right in self._spans(begin.t_s, to_s):
-            ahead_m, turn_rad = lasts_s * (left + right) / 2.0, lasts_s * (right - left) / self._wheelbase_m
+            ahead_m, turn_rad = lasts_s * (left + right) / 2.0, lasts_s * (right - left) / self.wheelbase_m
             chord_m = ahead_m * float(np.sinc(turn_rad / (2.0 * math.pi)))
             x_m += chord_m * math.cos(heading_rad + turn_rad / 2.0)
             y_m += chord_m * math.sin(heading_rad + turn_rad / 2.0)

@@ -20,7 +20,7 @@ class Driven:
     columns): as the robot's module has them, tracked, in the world frame, the first at the start, the others at the end of each
     command; rows: measurements, a row a look; ended: why it was over before its end, or nothing; seconds it took; spans_s: when
     each command was under way, of a robot whose commands can be unstable; stuck: what would not move any more, where that ended
-    it; leaps: how many poses were further from those before than the robot can drive.
+    it; leaps: how many poses were further from those before than the robot can drive, or turned further than it can turn.
     """
 
     commands: np.ndarray

@@ -41,7 +41,8 @@ def leaps_text(count: int) -> str:
     if not count:
         return ""
     which = "1 pose is" if count == 1 else f"{count} poses are"
-    return f"{which} further from the one before than the robot can drive (a false marker, a push?); bns track shows what is seen"
+    cannot = "further from the one before than the robot can drive, or turned further than it can turn"
+    return f"{which} {cannot} (a false marker, a push?); bns track shows what is seen"
 
 
 @dataclass(frozen=True)

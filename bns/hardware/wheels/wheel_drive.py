@@ -66,7 +66,7 @@ class WheelDrive:
         self._orders: list[Order] = []
         self._ends_s: list[float] = []
         self._seen: list[tuple[float, np.ndarray]] = []
-        self.leaps, self._fastest_m_s = Leaps(), 0.0
+        self.leaps, self._fastest_m_s, self._apart_m_s = Leaps(), 0.0, 0.0
 
     def carry_out(self, left_m_s: float, right_m_s: float, duration_s: float) -> None:
         """One command, watched until its time is over; if the robot is not seen just then, it lasts until it is."""
@@ -74,8 +74,9 @@ class WheelDrive:
         left, right = self._wheels.set_speed_m_s(left_m_s, right_m_s)
         if not self._orders:
             self._seen.append((asked_s, self._start))
-            self.leaps.seen(asked_s, self._start[:2], 0.0)
+            self.leaps.seen(asked_s, self._start[:2], 0.0, float(self._start[2]))
         self._fastest_m_s = max(self._fastest_m_s, abs(left), abs(right))
+        self._apart_m_s = max(self._apart_m_s, abs(left), abs(right), abs(left - right))  # one of them may be held
         self._orders.append(Order(asked_s, left, right))
         self._agreement.ordered(asked_s, left, right)
         self._journal.note("command", left_m_s=left, right_m_s=right, duration_s=duration_s)
@@ -111,7 +112,8 @@ class WheelDrive:
         self._watch.check(sight, self._eye.picture_s)
         if sight is not None:
             if self._orders:  # if it lasts, it is the agreement of poses and orders that pauses the trial
-                self.leaps.seen(sight.t_s, sight.pose[:2], _FASTER * self._fastest_m_s)
+                fastest_rad_s = _FASTER * self._apart_m_s / self._agreement.wheelbase_m
+                self.leaps.seen(sight.t_s, sight.pose[:2], _FASTER * self._fastest_m_s, float(sight.pose[2]), fastest_rad_s)
             self._agreement.seen(sight)
         return sight
 

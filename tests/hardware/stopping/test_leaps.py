@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bns.errors import TrialPausedError
-from bns.hardware.leaps import OFF_M, Leaps
+from bns.hardware.leaps import OFF_M, OFF_RAD, Leaps
 from bns.hardware.tracking.camera import FrameTracker
 from bns.hardware.tracking.sight import Sight
 from bns.hardware.tracking.wii import WiiTracker
@@ -35,14 +35,31 @@ def test_a_place_that_stays_away_counts_until_the_robot_can_be_there():
     assert lasts_s[-1] == 0.0
 
 
+def turned(*headings_rad, fastest_rad_s=2.0, step_s=0.1):
+    leaps = Leaps()
+    for i, heading_rad in enumerate(headings_rad):
+        leaps.seen(step_s * i, np.zeros(2), 0.5, heading_rad, fastest_rad_s)
+    return leaps.count
+
+
+def test_a_robot_may_turn_as_fast_as_it_can_and_a_little_more():
+    assert turned(0.0, 0.2 + OFF_RAD - 1e-6, 0.2) == 0
+    assert turned(0.0, 0.2 + OFF_RAD + 1e-6) == 1
+    assert turned(3.1, -3.1, 3.1 + 2 * np.pi) == 0
+
+
+def test_a_marker_that_is_seen_the_other_way_round_counts_once():
+    assert turned(0.0, 0.1, 0.1 + np.pi, 0.2, 0.3 - np.pi, 0.4) == 2
+
+
 def test_an_old_pose_is_no_leap():
     leaps = Leaps()
     leaps.seen(1.0, np.zeros(2), 0.5)
     assert leaps.seen(1.0, np.ones(2), 0.5) == leaps.seen(0.5, np.ones(2), 0.5) == leaps.count == 0
 
 
-def leaping(tracker, monkeypatch, aside_m, which):
-    """Every sight of a robot on its way whose number is in `which` is so far aside."""
+def leaping(tracker, monkeypatch, aside_m, which, turned_rad=0.0):
+    """Every sight of a robot on its way whose number is in `which` is so far aside, and turned."""
     good, seen, moving = tracker.look, [], []
 
     def look(self):
@@ -56,7 +73,7 @@ def leaping(tracker, monkeypatch, aside_m, which):
             return sight
         aside = np.array([aside_m, 0.0])
         points = {name: place + aside for name, place in sight.points.items()}
-        return Sight(sight.t_s, sight.pose + np.array([aside_m, 0.0, 0.0]), sight.residual_m, points)
+        return Sight(sight.t_s, sight.pose + np.array([aside_m, 0.0, turned_rad]), sight.residual_m, points)
 
     monkeypatch.setattr(tracker, "look", look)
 
@@ -69,6 +86,12 @@ def test_leaps_of_a_khepera_are_counted_and_told(tmp_path, monkeypatch, capsys):
     assert "2 poses are further from the one before than the robot can drive" in said.out
     assert len(past_evaluations(journal_of(tmp_path))) == 1
     assert len(measured(journal_of(tmp_path)))
+
+
+def test_headings_that_turn_round_are_counted_and_told(tmp_path, monkeypatch, capsys):
+    leaping(WiiTracker, monkeypatch, 0.0, {3, 8}, np.pi)
+    assert call(*TRIAL, "--evaluations", 1, "--results", tmp_path) == 0
+    assert "2 poses are further from the one before than the robot can drive, or turned further" in capsys.readouterr().out
 
 
 def test_a_trial_without_leaps_says_nothing_of_them(tmp_path, capsys):
