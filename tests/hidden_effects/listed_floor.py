@@ -117,8 +117,8 @@ class CasterTrail(Cause):
             kept = 0.0
             for _ in range(FINE):
                 off = np.where(speed > 1e-3, np.angle(pivot[:, i] * np.exp(-1j * caster)), 0.0)
-                upright = np.abs(off) > np.pi - 0.05  # no floor is so even that it stays so: it has fallen to a side by 3 degrees
-                off = np.where(upright, np.copysign(np.pi - 0.05, off), off)
+                upright = np.abs(off) > np.pi - 0.01  # no floor is so even that it stays so: it has fallen by half a degree
+                off = np.where(upright, np.copysign(np.pi - 0.01, off), off)
                 caster = np.where(upright, np.angle(pivot[:, i]) - off, caster)
                 left = 1 - self.loss * np.sin(off / 2) ** 2
                 kept = kept + left / FINE

@@ -72,8 +72,8 @@ def test_a_caster_that_trails_falls_to_a_side_at_reversals():
     driven = way("caster-trail", loss=0.5, trail_m=0.02)
     assert driven[0] == pytest.approx(0.1)
     way_m = 0.0
-    for _ in range(10_000):  # from 3 degrees beside backwards, tan(off/2) = 40, it falls by exp(-way/trail)
-        tangent = 40 * np.exp(-way_m / 0.02)
+    for _ in range(10_000):  # from half a degree beside backwards, tan(off/2) = 200, it falls by exp(-way/trail)
+        tangent = 200 * np.exp(-way_m / 0.02)
         way_m += 0.1 * (1 - 0.5 * tangent**2 / (1 + tangent**2)) * 1e-4
     assert driven[1] == pytest.approx(-way_m, abs=1e-5)
     slower = way("caster-trail", loss=0.5, trail_m=0.05)

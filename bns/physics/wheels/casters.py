@@ -106,8 +106,8 @@ def kept(ahead: Array, side: Array, yaw: Array, step_s: Array, trail: float, los
     return out
 
 
-_ASIDE = 0.025
-"""Half of the least angle (rad) between a caster and straight backwards: 3 degrees, a caster's play and a floor's tilt."""
+_ASIDE = 0.005
+"""Half of the least angle (rad) between a caster and straight backwards: half a degree, as wheels that scatter turn a robot."""
 _PART = 0.5
 """Parts of a step in trails of the caster. With a half, and a loss of 0.8, metres of way are 0.02 mm wrong."""
 _PARTS = 64
