@@ -18,10 +18,12 @@ from bns.diagnose.design.independent_measurement import independent_measurements
 from bns.diagnose.design.limits import arena_of, bounds_of
 from bns.diagnose.design.planned import delays_of, noise_free_predictor, planned_tracks
 from bns.diagnose.design.power import (
+    LONGEST_MINUTES,
     ExpectedGain,
     PastTrials,
     decision_probability,
     expected_standard_errors,
+    least_minutes,
     minutes_needed,
     power,
 )
@@ -471,6 +473,28 @@ def test_power_is_told_by_the_minutes_driven_until_then():
     assert chances[-1] == decision_probability(both)
     half = chances[minutes.index(pytest.approx(20 / 3))]  # the twenty short trials
     assert half == decision_probability([one.first(20) for one in both])
+
+
+@pytest.mark.parametrize(
+    ("told", "trials", "old", "times"),
+    [
+        (3.0, 40, 0.0, 0.0),  # suffices
+        (1.0, 40, 0.0, (3.28 / 3.13) ** 2),  # expected to show 3.1 standard errors
+        (0.3, 40, 0.0, (3.28 / 1.72) ** 2),
+        (0.3, 40, 9.0, 0.0),  # decided already
+        (0.3, 40, -1.0, np.inf),  # the trials so far speak against it
+    ],
+)
+def test_a_plan_that_does_not_suffice_takes_longer_than_it_lasts(told, trials, old, times):
+    new, before = np.full(trials, told), np.full(12, old) + 0.01 * (np.arange(12) - 5.5)
+    both = [ExpectedGain(before, new, np.full(12, 1.0), new)] * 2
+    lasting_s = np.full(trials, 15.0)
+    minutes = least_minutes(both, lasting_s)
+    if not np.isfinite(times):
+        assert minutes == LONGEST_MINUTES
+    else:
+        assert minutes == pytest.approx(10.0 * times, rel=0.15)
+    assert (minutes > 10.0) == (0.0 < decision_probability(both) < 0.9 or not np.isfinite(times))
 
 
 def test_what_was_seen_so_far_counts_for_the_explanation_that_it_was_likelier_under():

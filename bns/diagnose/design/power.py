@@ -13,6 +13,8 @@ from bns.diagnose.select.indistinguishable import TIE_SHARE, TIE_Z, matters
 from bns.diagnose.settings import DEFAULTS
 
 DRAWS = DEFAULTS.design.power_draws
+TARGET_POWER = DEFAULTS.design.target_power
+LONGEST_MINUTES = DEFAULTS.design.longest_minutes
 
 
 @dataclass(frozen=True)
@@ -108,6 +110,19 @@ def overdispersion_of(gains: Array, discriminations: Array) -> float:
     """
     by_noise = float(discriminations.mean())
     return max(float(gains.var(ddof=1)) / by_noise, 1.0) if by_noise > 1e-9 and len(gains) > 2 else 1.0
+
+
+def least_minutes(both: Sequence[ExpectedGain], lasting_s: Array) -> float:
+    """What it takes at least (min) until nine in ten decide, of a plan that does not suffice for it; 0 of one that does.
+
+    The gain over its standard error grows with the root of the time: from what old and planned trials are expected to show, to
+    `TIE_Z` + 1.28. A plan that shows as much, and whose difference is too small a share, takes longer than it lasts, too.
+    """
+    if decision_probability(both) >= TARGET_POWER or decision_probability([e.first(0) for e in both]) >= TARGET_POWER:
+        return 0.0
+    shown = sum(e.chance * expected_standard_errors(e) for e in both)
+    times = ((TIE_Z + 1.28) / shown) ** 2 if shown > 0 else np.inf
+    return min(float(lasting_s.sum() / 60) * max(times, 1.0), LONGEST_MINUTES)
 
 
 def minutes_needed(discrimination: float, minutes: float, scatter: float) -> float:

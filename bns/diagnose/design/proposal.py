@@ -22,10 +22,13 @@ from bns.diagnose.design.discrimination import Discrimination, ExperimentSetup, 
 from bns.diagnose.design.independent_measurement import independent_measurements
 from bns.diagnose.design.planners import Planner, WheelPlanner
 from bns.diagnose.design.power import (
+    LONGEST_MINUTES,
+    TARGET_POWER,
     ExpectedGain,
     PastTrials,
     decision_probability,
     expected_standard_errors,
+    least_minutes,
     minutes_needed,
     negligible_difference,
     overdispersion_of,
@@ -43,8 +46,6 @@ from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 from bns.physics.effects import all_effects
 
-LONGEST_MINUTES = DEFAULTS.design.longest_minutes
-TARGET_POWER = DEFAULTS.design.target_power
 MOST_FASTER = DEFAULTS.design.most_faster
 ALIKE_RMS = DEFAULTS.design.alike_rms
 LEAST_ERRORS = DEFAULTS.design.least_standard_errors
@@ -239,7 +240,7 @@ def _model_pairs(
                 one.title,
                 other.title,
                 0.0 if indistinguishable else decision_probability(both),
-                np.inf if indistinguishable else minutes,
+                np.inf if indistinguishable else max(minutes, least_minutes(both, best.plan.lasting_s)),
                 1.0 if indistinguishable else min(longer, MOST_FASTER),
                 indistinguishable,
                 decision_probability([e.first(0) for e in both]) >= TARGET_POWER,
