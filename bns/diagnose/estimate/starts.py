@@ -25,6 +25,7 @@ NOTHING = DEFAULTS.estimate.start_nothing
 _LIMITS = DEFAULTS.estimate.start_limits
 _MOST = DEFAULTS.estimate.start_most
 _LOOKS = DEFAULTS.estimate.look_rounds
+_BETWEEN = DEFAULTS.estimate.start_between
 
 
 def listed(
@@ -68,8 +69,7 @@ def fit_with(problem: Problem, base: Fit, effect: Effect, known: Model | None = 
     """
     start = best_start(problem, base, effect, known)
     hoped = min(start.loss, start.promised) if problem.predictor.screening is None else start.loss
-    from_afar = effect.after == FORMULAS and start.loss > base.loss
-    hopeless = base.loss - hoped < NOTHING * base.loss / len(base.losses) and not from_afar
+    hopeless = base.loss - hoped < NOTHING * base.loss / len(base.losses)
     return on_either_side(problem, problem.fit(start.model, 0 if hopeless else None, start.jacobian_by_parameter), effect)
 
 
@@ -119,8 +119,8 @@ def best_start(problem: Problem, base: Fit, effect: Effect, known: Model | None 
     """The fitted model with the effect at the most promising of its starts, one step of least squares taken.
 
     An effect with a jagged loss, beside one that looks like it, is judged after that step: what the other one makes up for now,
-    such as a lag for the ticks of a clock, has to give way first. Starts of a formula at which it does nothing (a limit that
-    nothing reaches) come last: no slope leads away from them.
+    such as a lag for the ticks of a clock, has to give way first. Where a formula does nothing at some starts (a limit that
+    nothing reaches), more are tried on the way to them: no slope leads away from there.
     """
     lows, highs = ([getattr(p, end) for p in effect.parameters] for end in ("low", "high"))
     found = (tuple(np.clip(values, lows, highs).tolist()) for values in _starts(effect, problem.predictor, base.model))
@@ -128,12 +128,25 @@ def best_start(problem: Problem, base: Fit, effect: Effect, known: Model | None 
     if known is not None and effect.name in {active.effect.name for active in known.effects}:
         starts.append(base.model.with_active(effect, tuple(known.values_of(effect.name).values())))
     losses = [problem.loss(start) for start in starts]
-    if effect.after == FORMULAS:
-        acting = [np.inf if np.isclose(loss, base.loss, rtol=1e-9, atol=0.0) else loss for loss in losses]
-        losses = acting if np.isfinite(acting).any() else losses
+    if effect.after == FORMULAS and len(effect.parameters) == 1:
+        tried = [next(iter(start.values_of(effect.name).values())) for start in starts]
+        between = _beside_idle(tried, losses, base.loss)
+        more = [base.model.with_active(effect, (value,)) for value in between]
+        starts, losses = [*starts, *more], [*losses, *(problem.loss(start) for start in more)]
     beside = {active.effect.name for active in base.model.effects} & set(effect.lookalikes)
     followed = range(len(starts)) if beside and any(p.jagged for p in effect.parameters) else [int(np.argmin(losses))]
     return min((_stepped(problem, base, starts[i], losses[i]) for i in followed), key=lambda one: one.loss)
+
+
+def _beside_idle(values: list[float], losses: list[float], idle: float) -> list[float]:
+    """Values between the best of those at which something changes and the nearest of its sign at which nothing does, by ratio."""
+    same = np.isclose(losses, idle, rtol=1e-9, atol=0.0)
+    if same.all() or not same.any():
+        return []
+    best = values[int(np.argmin(np.where(same, np.inf, losses)))]
+    still = [value for value, nothing in zip(values, same, strict=True) if nothing and value * best > 0.0]
+    nearest = min(still, key=lambda value: abs(np.log(value / best)), default=best)
+    return [] if nearest == best else [float(v) for v in np.geomspace(best, nearest, _BETWEEN + 2)[1:-1]]
 
 
 def _stepped(problem: Problem, base: Fit, start: Model, loss: float) -> StartingPoint:

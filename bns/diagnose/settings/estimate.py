@@ -196,6 +196,12 @@ class Estimate:
         "Number of start values, evenly spaced on a logarithmic scale, of a parameter whose neutral value is "
         f"infinite; {BY_HAND}.",
     )
+    start_between: int = setting(
+        8,
+        "values",
+        "Where a formula's only number does nothing at some of its starts, so many more are tried between the best of the others "
+        f"and the nearest of these, by ratio: 14 % apart where starts are three times apart; {BY_HAND}.",
+    )
     start_most: int = setting(
         216,
         "starts",

@@ -52,7 +52,7 @@ def test_a_sum_of_numbers_times_something_starts_at_nothing(term, linear):
         assert set(effect.neutral.values()) == {0.0}
 
 
-@pytest.mark.parametrize("limit_m_s", [0.15, 0.17])
+@pytest.mark.parametrize("limit_m_s", [0.15, 0.19, 0.21])
 def test_a_limit_is_found_from_starts_of_which_the_best_limits_nothing(limit_m_s):
     """Wheels share a supply: from 0.3 on it suffices for both, and 0.1 is worse than no limit at all."""
     effect = formula_effect("power", "min(1, k / (abs(l) + abs(r) + 0.0001)) - 1", "share")
