@@ -476,25 +476,32 @@ def test_power_is_told_by_the_minutes_driven_until_then():
 
 
 @pytest.mark.parametrize(
-    ("told", "trials", "old", "times"),
+    ("told", "old", "worth", "times"),
     [
-        (3.0, 40, 0.0, 0.0),  # suffices
-        (1.0, 40, 0.0, (3.28 / 3.13) ** 2),  # expected to show 3.1 standard errors
-        (0.3, 40, 0.0, (3.28 / 1.72) ** 2),
-        (0.3, 40, 9.0, 0.0),  # decided already
-        (0.3, 40, -1.0, np.inf),  # the trials so far speak against it
+        (3.0, 0.0, 3.0, 0.0),  # suffices
+        (1.0, 0.0, 1.0, (3.28 / 3.13) ** 2),  # expected to show 3.1 standard errors
+        (0.3, 0.0, 0.3, (3.28 / 1.72) ** 2),
+        (0.3, 9.0, 0.3, 0.0),  # decided already
+        (0.3, -90.0, 0.3, np.inf),  # the trials so far speak against it
     ],
 )
-def test_a_plan_that_does_not_suffice_takes_longer_than_it_lasts(told, trials, old, times):
-    new, before = np.full(trials, told), np.full(12, old) + 0.01 * (np.arange(12) - 5.5)
-    both = [ExpectedGain(before, new, np.full(12, 1.0), new)] * 2
-    lasting_s = np.full(trials, 15.0)
-    minutes = least_minutes(both, lasting_s)
-    if not np.isfinite(times):
-        assert minutes == LONGEST_MINUTES
-    else:
-        assert minutes == pytest.approx(10.0 * times, rel=0.15)
-    assert (minutes > 10.0) == (0.0 < decision_probability(both) < 0.9 or not np.isfinite(times))
+def test_a_plan_that_does_not_suffice_takes_longer_than_it_lasts(told, old, worth, times):
+    new, before = np.full(40, told), np.full(12, old) + 0.01 * (np.arange(12) - 5.5)
+    both = [ExpectedGain(before, new, np.full(12, 1.0), np.full(40, worth))] * 2
+    minutes = least_minutes(both, np.full(40, 15.0))
+    assert minutes == (pytest.approx(10.0 * times, rel=0.2) if np.isfinite(times) else LONGEST_MINUTES)
+    assert (minutes > 10.0) == (times > 0.0)
+
+
+def test_a_difference_that_old_trials_make_too_small_a_share_takes_more_new_ones():
+    """Sure by its standard error, but a small share of what is explained in all, until enough is driven."""
+    both = [ExpectedGain(np.full(100, 0.2), np.full(10, 8.0), np.full(100, 2e4), np.full(10, 80.0))] * 2
+    assert decision_probability(both) < 0.1
+    minutes = least_minutes(both, np.full(10, 12.0))
+    trials = round(5 * minutes)
+    assert 10 < trials < 1000
+    assert decision_probability([e.repeated(trials) for e in both]) >= 0.9
+    assert decision_probability([e.repeated(round(0.8 * trials)) for e in both]) < 0.9
 
 
 def test_what_was_seen_so_far_counts_for_the_explanation_that_it_was_likelier_under():

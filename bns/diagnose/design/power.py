@@ -40,6 +40,12 @@ class ExpectedGain:
         )
 
 
+    def repeated(self, trials: int) -> ExpectedGain:
+        """With so many trials, the planned ones over and over."""
+        new, worth = np.resize(self.new, trials), np.resize(self.worth_new, trials)
+        return ExpectedGain(self.old, new, self.worth_old, worth, self.scatter, self.chance)
+
+
 @dataclass(frozen=True)
 class PastTrials:
     """Of the trials seen so far, for a pair of explanations: squares of their gains about the mean,
@@ -113,16 +119,25 @@ def overdispersion_of(gains: Array, discriminations: Array) -> float:
 
 
 def least_minutes(both: Sequence[ExpectedGain], lasting_s: Array) -> float:
-    """What it takes at least (min) until nine in ten decide, of a plan that does not suffice for it; 0 of one that does.
-
-    The gain over its standard error grows with the root of the time: from what old and planned trials are expected to show, to
-    `TIE_Z` + 1.28. A plan that shows as much, and whose difference is too small a share, takes longer than it lasts, too.
-    """
-    if decision_probability(both) >= TARGET_POWER or decision_probability([e.first(0) for e in both]) >= TARGET_POWER:
+    """How long a plan that does not suffice has to be driven, again and again (min), until nine in ten decide; else 0."""
+    if not len(lasting_s) or decision_probability([e.first(0) for e in both]) >= TARGET_POWER:
         return 0.0
-    shown = sum(e.chance * expected_standard_errors(e) for e in both)
-    times = ((TIE_Z + 1.28) / shown) ** 2 if shown > 0 else np.inf
-    return min(float(lasting_s.sum() / 60) * max(times, 1.0), LONGEST_MINUTES)
+
+    def minutes(trials: int) -> float:
+        return float(np.resize(lasting_s, trials).sum() / 60)
+
+    def decides(trials: int) -> bool:
+        return decision_probability([e.repeated(trials) for e in both]) >= TARGET_POWER
+
+    low, high = 0, len(lasting_s)
+    while not decides(high):
+        low, high = high, 2 * high
+        if minutes(low) > LONGEST_MINUTES:
+            return LONGEST_MINUTES
+    while low and high - low > max(low // 50, 1):
+        middle = (low + high) // 2
+        low, high = (low, middle) if decides(middle) else (middle, high)
+    return min(minutes(high), LONGEST_MINUTES) if low else 0.0
 
 
 def minutes_needed(discrimination: float, minutes: float, scatter: float) -> float:
