@@ -129,6 +129,7 @@ def _speed(term: Formula, predictor: Predictor) -> str:
     if isinstance(predictor, WheelPredictor):  # the term begins from what the effects of the wheels leave of the commands
         turned = predictor.turned(term.fit.model)
         wheels = np.stack([turned.left_m_s, turned.right_m_s])
+    wheels = {LEFT: wheels[:1], RIGHT: wheels[1:]}.get(term.on, wheels)  # of one wheel's curve, only what this one drove
     fastest = float(np.abs(wheels).max())
     at = fastest * np.array([0.1, 0.3, 1.0])
     got = at + curve_of(term, "u", at, since=NEVER_M)

@@ -341,6 +341,24 @@ def test_a_wheel_that_is_slower_by_one_share_is_not_called_out_of_proportion(ter
     assert said in in_words(stand_in, predictor_of(NOMINAL))
 
 
+@pytest.mark.parametrize(
+    ("on", "signal", "fastest"),
+    [
+        ("left", "speed of the left wheel", 0.02),
+        ("right", "speed of the right wheel", 0.12),
+        ("wheels", "speed of each wheel", 0.12),
+    ],
+)
+def test_of_one_wheels_curve_only_what_this_wheel_drove_is_said(on, signal, fastest):
+    """Beyond that the curve says nothing: the left wheel never turned faster than 0.02 m/s."""
+    table = measured(NOMINAL, trials=12, speeds=(0.0, 0.12))
+    predictor = WheelPredictor(tracks_of(table.assign(left_m_s=table["left_m_s"] / 6)))
+    fit = SimpleNamespace(model=NOMINAL)
+    words = in_words(SimpleNamespace(on=on, term="-0.5 * u * abs(u)", values={}, signal=signal, fit=fit), predictor)
+    told = [float(text) for text in re.findall(r"([\d.e-]+) m/s gives", words)]
+    assert max(told) == pytest.approx(fastest, rel=0.05)
+
+
 def test_where_the_floor_brakes_is_said():
     predictor = predictor_of(NOMINAL)
     term = "-0.1 * exp(-((x - 0.2)**2 + (y + 0.1)**2) / 0.02)"
