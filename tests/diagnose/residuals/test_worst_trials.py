@@ -110,7 +110,9 @@ def test_the_worst_trials_hide_the_next_ones_and_together_they_count():
     assert worst.moved_m < 0.01 < worst.predicted_m
     assert found.behaviour[0].startswith("in 4 of 40 trials the error is large for a moment")
     assert worst.in_words in found.behaviour[0]
-    assert f"It behaves like this: {found.behaviour[0]}." in diagnosis_text(found)
+    assert found.behaviour[1] == "in 3 of these 4 moments the robot stood still, whatever it was told"
+    for said in found.behaviour:
+        assert f"  - {said}." in diagnosis_text(found)
 
 
 def test_what_does_not_count_bends_no_number_and_is_judged():

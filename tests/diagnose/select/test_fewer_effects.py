@@ -318,6 +318,7 @@ def test_where_an_effect_only_imitates_the_simpler_one_that_it_extends_is_asked_
     assert standing_module.with_parts(SelectionResult(problem, problem.fit(given), fit, ("inertia-lag",), ()), ()) is None
 
     asked, seen = [], []
+    monkeypatch.setattr(standing_module, "may_be_neutral", lambda _: "")  # neither lag is there
 
     def found_beside(stays, selection, *_):
         asked.append(selection.accepted)
