@@ -1,4 +1,4 @@
-"""The table of errors stays beside the switches that change it, and a number without a unit is shown without one."""
+"""The table of errors stays visible while the list of effects scrolls; dimensionless parameters are shown without a unit."""
 
 import pytest
 

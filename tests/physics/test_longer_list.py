@@ -50,7 +50,8 @@ def test_a_caster_drags_after_reversals_for_its_trail():
     assert abs(slower[1]) < abs(driven[1])
 
 
-def test_a_casters_drag_does_not_depend_on_the_steps():
+@pytest.mark.parametrize("name", ["caster-swing", "caster-trail"])
+def test_a_casters_drag_does_not_depend_on_the_steps(name):
     """Steps of 80 ms with a short one among them, as between poses with one lost, against steps of 1 ms."""
 
     def forward_m(step_s):
@@ -60,7 +61,7 @@ def test_a_casters_drag_does_not_depend_on_the_steps():
         zero = np.zeros_like(speed)
         left, right = speed - turn * B / 2, speed + turn * B / 2
         body = Body(speed, zero, turn, zero + 1, left, right, (end - step_s / 2)[None], wheelbase_m=B, step_s=step_s[None])
-        slowed = effect_named("caster-swing").apply(body, loss=0.6, trail_m=0.03)
+        slowed = effect_named(name).apply(body, loss=0.6, trail_m=0.03)
         return float((slowed.forward_m_s * step_s).sum())
 
     coarse = np.array([*[0.08] * 7, 0.04, *[0.08] * 9, *[0.08] * 5, 0.04])
@@ -78,24 +79,6 @@ def test_a_caster_that_trails_falls_to_a_side_at_reversals():
     assert driven[1] == pytest.approx(-way_m, abs=1e-5)
     slower = way("caster-trail", loss=0.5, trail_m=0.05)
     assert abs(slower[1]) < abs(driven[1])
-
-
-def test_a_trailing_casters_drag_does_not_depend_on_the_steps():
-    """Steps of 80 ms with a short one among them, as between poses with one lost, against steps of 1 ms."""
-
-    def forward_m(step_s):
-        end = np.cumsum(step_s)
-        speed = np.where(end <= 0.6 + 1e-9, 0.1, np.where(end <= 1.32 + 1e-9, -0.12, 0.15))[None]
-        turn = np.where(end <= 1.32 + 1e-9, 0.3, -0.9)[None]
-        zero = np.zeros_like(speed)
-        left, right = speed - turn * B / 2, speed + turn * B / 2
-        body = Body(speed, zero, turn, zero + 1, left, right, (end - step_s / 2)[None], wheelbase_m=B, step_s=step_s[None])
-        slowed = effect_named("caster-trail").apply(body, loss=0.6, trail_m=0.03)
-        return float((slowed.forward_m_s * step_s).sum())
-
-    coarse = np.array([*[0.08] * 7, 0.04, *[0.08] * 9, *[0.08] * 5, 0.04])
-    fine = np.full(round(coarse.sum() / 1e-3), 1e-3)
-    assert forward_m(coarse) == pytest.approx(forward_m(fine), abs=2e-6)
 
 
 @pytest.mark.parametrize(("loss", "trail_m"), [(0.3, 0.005), (0.8, 0.02), (0.5, 0.2)])

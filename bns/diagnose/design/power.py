@@ -15,6 +15,7 @@ from bns.diagnose.settings import DEFAULTS
 DRAWS = DEFAULTS.design.power_draws
 TARGET_POWER = DEFAULTS.design.target_power
 LONGEST_MINUTES = DEFAULTS.design.longest_minutes
+MOST_REPEATS = DEFAULTS.design.most_repeats
 
 
 @dataclass(frozen=True)
@@ -34,14 +35,7 @@ class ExpectedGain:
     chance: float = 0.5
 
     def first(self, trials: int) -> ExpectedGain:
-        """With fewer of the planned trials."""
-        return ExpectedGain(
-            self.old, self.new[:trials], self.worth_old, self.worth_new[:trials], self.scatter, self.chance
-        )
-
-
-    def repeated(self, trials: int) -> ExpectedGain:
-        """With so many trials, the planned ones over and over."""
+        """With so many of the planned trials; of more than there are, these again and again."""
         new, worth = np.resize(self.new, trials), np.resize(self.worth_new, trials)
         return ExpectedGain(self.old, new, self.worth_old, worth, self.scatter, self.chance)
 
@@ -127,12 +121,12 @@ def least_minutes(both: Sequence[ExpectedGain], lasting_s: Array) -> float:
         return float(np.resize(lasting_s, trials).sum() / 60)
 
     def decides(trials: int) -> bool:
-        return decision_probability([e.repeated(trials) for e in both]) >= TARGET_POWER
+        return decision_probability([e.first(trials) for e in both]) >= TARGET_POWER
 
     low, high = 0, len(lasting_s)
     while not decides(high):
         low, high = high, 2 * high
-        if minutes(low) > LONGEST_MINUTES:
+        if minutes(high) > LONGEST_MINUTES or high > MOST_REPEATS * len(lasting_s):
             return LONGEST_MINUTES
     while low and high - low > max(low // 50, 1):
         middle = (low + high) // 2

@@ -89,7 +89,7 @@ def fit_set(
 
 
 def _in_the_lowest_valley(predictor: Predictor, problem: Problem, fit: Fit) -> tuple[Problem, Fit]:
-    """The fit of a body with its profiles simulated; noise and numbers anew, some times, where these lead to another valley."""
+    """The fit of a body with its profiles simulated; where these show a lower minimum, noise and parameters are fitted again."""
     for _ in range(ROUNDS):
         profiled, lower = with_simulated_profiles(problem, fit)
         if lower is None:

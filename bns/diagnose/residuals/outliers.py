@@ -37,7 +37,7 @@ TURN = DEFAULTS.residuals.fault_turn
 ALONE = DEFAULTS.residuals.outlier_alone
 CHANCE = DEFAULTS.residuals.chance
 STILL = DEFAULTS.residuals.outlier_still
-LIKE_BEFORE = DEFAULTS.residuals.outlier_like_before
+LATER = DEFAULTS.residuals.outlier_late
 MOSTLY = DEFAULTS.residuals.outlier_mostly
 _CLIP = DEFAULTS.residuals.clip
 STOOD, LATE = "stood still", "did what it had been told shortly before"
@@ -177,7 +177,7 @@ def _did(problem: Problem, fit: Fit, begin: int, end: int, half_m: float) -> str
     if np.linalg.norm(moved * sizes) < STILL * np.linalg.norm(predicted[0] * sizes):
         return STOOD
     missed = np.linalg.norm((predicted - moved) * sizes, axis=1)
-    return LATE if missed.min() < LIKE_BEFORE * missed[0] else ""
+    return LATE if missed.min() < LATER * missed[0] else ""
 
 
 def what_they_did(moments: Sequence[Outlier]) -> str:

@@ -82,6 +82,12 @@ class Design:
     power_points: int = setting(
         9, "points", "Points of the curve of the power against minutes: enough to see where it rises."
     )
+    most_repeats: int = setting(
+        64,
+        "times",
+        "A plan that does not suffice is imagined driven so many times at most; one that would not decide then is said to take "
+        f"as long as the longest experiment; {BY_HAND}.",
+    )
     target_power: float = setting(
         0.9, "1", f"An experiment counts as decisive if it decides with this probability: a usual power; {BY_HAND}."
     )

@@ -258,7 +258,7 @@ class Residuals(CommandTimes):
         "In a moment that stands out the robot is said to have stood still if it moved by less than this fraction of what was "
         f"predicted; {BY_HAND}.",
     )
-    outlier_like_before: float = setting(
+    outlier_late: float = setting(
         0.5,
         "1",
         "It is said to have done what it had been told shortly before if what is predicted of a window up to as many frames "

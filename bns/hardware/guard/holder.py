@@ -1,4 +1,4 @@
-"""Which guard has a port, for the message to somebody who finds it in use: one may outlive its trial for hours."""
+"""Finds the guard process that holds a serial port, for error messages: a guard may run for hours after its trial."""
 
 from __future__ import annotations
 

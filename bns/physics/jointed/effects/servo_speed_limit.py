@@ -28,4 +28,5 @@ EFFECT = Effect(
     measurement="let one servo turn freely from end to end and measure the time",
     starts=((0.79,), (0.49,), (0.3,), (0.19,)),
     apply=apply,
+    revision=2,  # the share is of how fast set points move over half a second, no longer over a twentieth
 )
