@@ -45,7 +45,8 @@ class Parameter:
     size_power: float = 0.0
     """The plausible range and the start values grow with this power of the wheelbase: 1 for lengths and speeds."""
     floor_share: float = 0.0
-    """Upper bound of a length, as a fraction of the diagonal of the area where the robot was seen; 0: no such bound."""
+    """Upper bound of a length, in diagonals of the area where the robot was seen; 0: no such bound. Of a place (`floor_axis`):
+    how far from that area it may be, on either side."""
     floor_axis: str = ""
     """x or y: a place, plausible as far from the area where the robot was seen as that is long (its diagonal)."""
     trial_share: float = 0.0
@@ -92,8 +93,11 @@ class Parameter:
         """The parameter for a robot that was seen between these corners (x, y): its `floor_share`, its `floor_axis`."""
         diagonal_m = float(np.hypot(*(high_m - low_m)))
         if self.floor_axis:
-            axis = "xy".index(self.floor_axis)
-            return replace(self, plausible=(float(low_m[axis]) - diagonal_m, float(high_m[axis]) + diagonal_m))
+            axis, far_m = "xy".index(self.floor_axis), diagonal_m * (self.floor_share or 1.0)
+            ends = float(low_m[axis]) - far_m, float(high_m[axis]) + far_m
+            if not self.floor_share:
+                return replace(self, plausible=ends)
+            return replace(self, low=ends[0], high=ends[1], plausible=ends, neutral=float(np.clip(self.neutral, *ends)))
         if not self.floor_share:
             return self
         high = max(self.floor_share * diagonal_m, 4.0 * self.low)

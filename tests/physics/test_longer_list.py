@@ -442,3 +442,13 @@ def test_a_lens_has_its_centre_near_the_floor_that_it_shows():
     lens = effect_named("lens-distortion").within(np.array([29.0, -2.0]), np.array([32.0, 2.0]))
     assert [p.plausible for p in lens.parameters[1:]] == [(24.0, 37.0), (-7.0, 7.0)]
     assert lens.parameters[0] == effect_named("lens-distortion").parameters[0]
+
+
+@pytest.mark.parametrize("name", ["tether-pull", "tether-load"])
+def test_an_anchor_is_at_most_ten_floors_away(name):
+    """From there its pull differs by less than a tenth across the floor: it is a slope's."""
+    pull = effect_named(name).within(np.array([200.0, -2.0]), np.array([203.0, 2.0]))
+    east, north = (next(p for p in pull.parameters if p.name == f"anchor_{axis}_m") for axis in "xy")
+    assert (east.low, east.high, east.plausible, east.neutral) == (150.0, 253.0, (150.0, 253.0), 150.0)
+    assert (north.low, north.high, north.neutral) == (-52.0, 52.0, 0.0)
+    assert pull.parameters[0] == effect_named(name).parameters[0]

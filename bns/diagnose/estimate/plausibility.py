@@ -15,6 +15,8 @@ from bns.physics.effect import Parameter
 from bns.physics.model import Model
 
 CHANCE = DEFAULTS.estimate.together_chance
+_NEAR = np.sqrt(2.0 * DEFAULTS.estimate.fit_settled)
+"""Standard errors: nearer to where the loss is least no fit is sure to end, since the loss rises by half their square."""
 
 
 def at_bound(fit: Fit, name: str) -> bool:
@@ -80,10 +82,20 @@ def undetermined(fit: Fit, name: str) -> str:
 def limiting(fit: Fit, name: str) -> bool:
     """Whether a number of an effect may be anything, so that the effect does the work of a shorter one.
 
-    So it is, too, where it is as long as a trial or as the floor is wide, and would be longer: the log sets no end to it.
+    So it is, too, where it is as long as a trial or as the floor is wide, and would be longer, or as far away as a place may be:
+    the log sets no end to it.
     """
-    own = [(i, number.parameter, fit.values[i]) for i, number in enumerate(fit.free) if number.effect == name]
-    return any(_spans(fit, i) or bool((p.trial_share or p.floor_share) and value == p.high) for i, p, value in own)
+    own = [i for i, number in enumerate(fit.free) if number.effect == name]
+    return any(_spans(fit, i) or _endless(fit, i) for i in own)
+
+
+def _endless(fit: Fit, i: int) -> bool:
+    """Whether a number's only end is the log's: it is there, as nearly as a fit comes to where the loss is least."""
+    p, value = fit.free[i].parameter, float(fit.values[i])
+    if not (p.trial_share or p.floor_share):
+        return False
+    near = _NEAR * fit.se(i)
+    return bool(value >= p.high - near or (p.floor_axis and value <= p.low + near))
 
 
 def does_nothing(fit: Fit, name: str) -> bool:

@@ -26,8 +26,8 @@ EFFECT = Effect(
     sentence="the robot drifts in one direction of the floor, as on a slope",
     measurement="lay a spirit level on the floor, in two directions",
     beside={
-        "tether-pull": "A floor-slope is a tether-pull from far away: to tell them apart, drive on both sides of the "
-        "assumed anchor."
+        "tether-pull": "A floor-slope is a tether-pull from far away: to tell them apart, drive over as much of the floor "
+        "as there is, along the drift: the nearer its anchor, the less a tether pulls."
     },
     revision=2,
     apply=apply,

@@ -11,7 +11,7 @@ import numpy as np
 
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Body, Wheels
-from bns.physics.wheels.loads import AT_REST, guessed, pulled
+from bns.physics.wheels.loads import ANCHOR, AT_REST, guessed, pulled
 
 
 def apply(
@@ -47,9 +47,10 @@ EFFECT = Effect(
     name="tether-load",
     stage="body",
     parameters=(
-        Parameter("pull_per_s", "1/s", 0.0, 5.0, (0.0, 0.5), 0.0, "speed per metre of distance from the anchor"),
-        Parameter("anchor_x_m", "m", -100.0, 100.0, (-100.0, 100.0), 0.0, "anchor of the cable, east"),
-        Parameter("anchor_y_m", "m", -100.0, 100.0, (-100.0, 100.0), 0.0, "anchor of the cable, north"),
+        Parameter(
+            "pull_per_s", "1/s", 0.0, 5.0, (0.0, 0.5), 0.0, "speed per metre of distance from the anchor", resolution=1e-5
+        ),
+        *ANCHOR,
         Parameter(
             "free_m",
             "m",
@@ -76,7 +77,10 @@ EFFECT = Effect(
     lookalikes=("tether-pull", "slope-load"),
     sentence="something pulls on the robot's wheels towards one point, as a cable or a spring does",
     measurement="repeat some trials with the cable unplugged or held up",
-    beside={"slope-load": "A slope is a cable from far away: to tell them apart, drive on both sides of the assumed anchor."},
+    beside={
+        "slope-load": "A slope is a cable from far away: to tell them apart, drive over as much of the floor as there is, along "
+        "the pull: the nearer its anchor, the less a cable pulls."
+    },
     apply=apply,
     revision=2,
     needs="track",

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Flow
+from bns.physics.wheels.loads import ANCHOR
 
 
 def apply(flow: Flow, pull_per_s: float, anchor_x_m: float, anchor_y_m: float) -> Flow:
@@ -33,9 +34,17 @@ EFFECT = Effect(
     name="tether-pull",
     stage="world",
     parameters=(
-        Parameter("pull_per_s", "1/s", 0.0, 5.0, (0.0, 0.5), 0.0, "drift velocity per metre of distance from the anchor"),
-        Parameter("anchor_x_m", "m", -100.0, 100.0, (-100.0, 100.0), 0.0, "anchor of the cable, east"),
-        Parameter("anchor_y_m", "m", -100.0, 100.0, (-100.0, 100.0), 0.0, "anchor of the cable, north"),
+        Parameter(
+            "pull_per_s",
+            "1/s",
+            0.0,
+            5.0,
+            (0.0, 0.5),
+            0.0,
+            "drift velocity per metre of distance from the anchor",
+            resolution=2e-6,  # from 100 m away it moves the robot by 0.2 mm/s, as a step of a slope does
+        ),
+        *ANCHOR,
     ),
     equation="dx/dt += k·(ax - x), dy/dt += k·(ay - y) while moving",
     residuals="Positions are off towards one point; the error grows with the distance from it.",

@@ -10,6 +10,18 @@ from bns.physics.signals import Array, Body, Wheels
 _PIECE_S, _FEWEST = 0.4, 50
 """Long enough that a pose's noise is small against the way, short enough to lie at one place."""
 
+_FAR = 10.0
+"""From so many diagonals of the floor away a pull that grows with the distance differs by less than a tenth across the floor:
+it is a slope. An anchor that would be farther is none."""
+
+
+def _anchor(axis: str, way: str) -> Parameter:
+    name, text = f"anchor_{axis}_m", f"anchor of the cable, {way}"
+    return Parameter(name, "m", -1e4, 1e4, (-100.0, 100.0), 0.0, text, floor_share=_FAR, floor_axis=axis)
+
+
+ANCHOR = _anchor("x", "east"), _anchor("y", "north")
+
 AT_REST = Parameter(
     "at_rest",
     "1",

@@ -105,9 +105,29 @@ def test_an_effect_is_undetermined_where_all_its_numbers_may_be_anything_and_lim
     names = (GAIN, replace(GAIN, name="lag"))
     free = tuple(FreeParameter("e", p) for p, _ in zip(names, intervals, strict=False))
     other = FreeParameter("other", GAIN)
-    fit = SimpleNamespace(free=(*free, other), values=[1.0] * 3, interval=lambda i: [*intervals, (0.1, 9.0)][i])
+    fit = SimpleNamespace(
+        free=(*free, other), values=[1.0] * 3, interval=lambda i: [*intervals, (0.1, 9.0)][i], se=lambda _: 0.1
+    )
     assert undetermined(fit, "e") == said
     assert limiting(fit, "e") is may_be_anything
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "said"),
+    [
+        ({"floor_share": 10.0, "floor_axis": "x"}, 8.9, True),
+        ({"floor_share": 10.0, "floor_axis": "x"}, 8.0, False),
+        ({"floor_share": 10.0, "floor_axis": "x"}, 0.2, True),  # as far to the other side
+        ({"floor_share": 0.3}, 0.2, False),  # a length that is short has an end
+        ({"trial_share": 1.0}, 9.0, True),
+        ({"floor_axis": "x"}, 9.0, False),
+        ({}, 9.0, False),
+    ],
+)
+def test_a_number_to_which_only_the_log_sets_an_end_is_limiting_as_near_as_a_fit_comes_to_it(kind, value, said):
+    p = replace(GAIN, low=0.1, high=9.0, **kind)
+    fit = SimpleNamespace(free=(FreeParameter("e", p),), values=[value], interval=lambda _: (value - 0.01, value), se=lambda _: 1.0)
+    assert limiting(fit, "e") is said
 
 
 def test_a_number_without_bounds_is_never_said_to_be_anything():
