@@ -126,7 +126,8 @@ def test_an_effect_is_undetermined_where_all_its_numbers_may_be_anything_and_lim
 )
 def test_a_number_to_which_only_the_log_sets_an_end_is_limiting_as_near_as_a_fit_comes_to_it(kind, value, said):
     p = replace(GAIN, low=0.1, high=9.0, **kind)
-    fit = SimpleNamespace(free=(FreeParameter("e", p),), values=[value], interval=lambda _: (value - 0.01, value), se=lambda _: 1.0)
+    free, interval = (FreeParameter("e", p),), (value - 0.01, value)
+    fit = SimpleNamespace(free=free, values=[value], interval=lambda _: interval, se=lambda _: 1.0)
     assert limiting(fit, "e") is said
 
 
