@@ -34,6 +34,7 @@ from bns.diagnose.estimate.pseudo_inverse import pseudo_inverse
 from bns.diagnose.estimate.significance import PairedComparison, chance, jackknife_covariance, paired_elpd_diff
 from bns.diagnose.predict.base import Predictor, Steps
 from bns.diagnose.settings import DEFAULTS
+from bns.engine.pose_filter import TRUSTED
 from bns.physics.model import Model
 
 _LATELY = 16
@@ -268,18 +269,19 @@ class Problem:
         return eliminate_clocks(self, at.model, at.whitened, out)
 
     def _slope(self, at: _Point, free: Sequence[FreeParameter], j: int, by: float) -> Array:
-        """A column of the Jacobian, (frames, 3). Where one trial rules it, each trial's slope to the flatter side.
+        """A column of the Jacobian, (frames, 3). Where it holds a jump, or one trial rules it, each trial's slope to the flatter side.
 
         Far from the truth the filter is reset in some trials (`innovations`), and a change of the number by a thousandth can
-        move where: a jump, whose slope says that this trial alone knows the number. Bodies, which have no such filter, have wide
-        slopes instead.
+        move where: a jump by more than the filter trusts any pose, whose slope says that these trials alone know the number.
+        Bodies, which have no such filter, have wide slopes instead; where a number has steps of its own, they are no such jumps.
         """
         slope = self._difference(at, free, j, by)
         if self.predictor.luck is not None:
             return slope
         steepness = self.per_trial((slope**2).sum(axis=1))
         p, other = free[j].parameter, free[j].of(at.model) - by
-        if steepness.max() <= _RULED * steepness.sum() or not p.low <= other <= p.high:
+        jumps = not p.jagged and float(np.abs(slope * by).max(initial=0.0)) > TRUSTED
+        if not (jumps or steepness.max() > _RULED * steepness.sum()) or not p.low <= other <= p.high:
             return slope
         back = self._difference(at, free, j, -by)
         flatter = self.per_trial((back**2).sum(axis=1)) < steepness

@@ -154,16 +154,27 @@ def test_the_noise_of_tracking_is_taken_from_the_tracks_where_they_tell_it():
     assert abs(guessed[:2] / known[:2] - 1).min() > 0.1
 
 
-@pytest.mark.parametrize(("ruling", "flatter"), [(3.1, True), (2.9, False)])
-def test_where_one_trial_rules_a_slope_each_trial_has_the_one_of_its_flatter_side(ruling, flatter):
+@pytest.mark.parametrize(
+    ("name", "before", "ruling", "flatter"),
+    [
+        ("wheelbase", 0.7, 3.1, True),
+        ("wheelbase", 0.7, 2.9, False),
+        ("wheelbase", 4900.0, 4900.0, False),  # a step of a thousandth moves both by 4.9 standard deviations
+        ("wheelbase", 5100.0, 5100.0, True),  # and by 5.1: two trials jump at once, and neither rules alone
+        ("dead-band", 5100.0, 5100.0, False),  # a number that has steps of its own
+    ],
+)
+def test_where_a_slope_jumps_each_trial_has_the_one_of_its_flatter_side(name, before, ruling, flatter):
     """Three trials of one frame each; the last has more or less than nine tenths of the sum of squares."""
-    one = FreeParameter("wheelbase", effect_named("wheelbase").parameters[0])
-    ahead, back = (np.array([[a, 0.0, 0.0], [0.0, b, 0.0], [0.0, 0.0, c]]) for a, b, c in ((0.7, 0.7, ruling), (0.6, 0.8, 0.1)))
+    one = FreeParameter(name, effect_named(name).parameters[0])
+    rows = ((before, 0.7, ruling), (0.6, 0.8, 0.1))
+    ahead, back = (np.array([[a, 0.0, 0.0], [0.0, b, 0.0], [0.0, 0.0, c]]) for a, b, c in rows)
     problem = Problem.__new__(Problem)
     problem.predictor = SimpleNamespace(luck=None, tracks=SimpleNamespace(first=np.arange(4)))
     problem._trial = np.arange(3)
     problem._difference = lambda _at, _free, _j, by: ahead if by > 0 else back
-    at = SimpleNamespace(model=hidden(wheelbase={"factor": 1.0}))
+    values = tuple(value + 0.05 for value in effect_named(name).neutral.values())
+    at = SimpleNamespace(model=NOMINAL.with_active(effect_named(name), values))
     found = problem._slope(at, [one], 0, 1e-3)
     np.testing.assert_array_equal(found, np.stack([back[0], ahead[1], back[2]]) if flatter else ahead)
     problem.predictor.luck = object()
