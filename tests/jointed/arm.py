@@ -49,8 +49,9 @@ def log(
     finer: int = 1,
     speed_rad_s: float = np.inf,
     told_rad_s: float = np.inf,
+    seen_every: int = 10,
 ) -> pd.DataFrame:
-    """Random set points every 0.48 s, seen at 25 Hz; the elbow's zero may be off, its servo weak or of a lower gain.
+    """Random set points every 0.48 s, seen every ``seen_every`` steps of 4 ms (25 Hz); the elbow's zero may be off, its servo weak or of a lower gain.
 
     ``friction_n_m``: dry friction in each joint. ``carried_kg``: at the hand. ``finer``: with steps so many times shorter than
     the model's, and another integrator. ``speed_rad_s``: of the servos, which go from set point to set point no faster;
@@ -71,9 +72,11 @@ def log(
                 goal = rng.uniform(-1.2, 1.2, 3)
             if step % 10 == 0:
                 told = told + np.clip(goal - told, -10 * 0.004 * told_rad_s, 10 * 0.004 * told_rad_s)
+            if step % 10 == 0 or step % seen_every == 0:
                 mujoco.mj_kinematics(model, data)
                 seen = np.concatenate([data.site(name).xpos[:2] for name in ("elbow", "hand")])
-                rows.append((trial, step * 0.004, *told, *(seen + noise_m * rng.normal(size=4))))
+                seen = seen + noise_m * rng.normal(size=4) if step % seen_every == 0 else np.full(4, np.nan)
+                rows.append((trial, step * 0.004, *told, *seen))
             follows = follows + np.clip(told - follows, -0.004 * speed_rad_s, 0.004 * speed_rad_s)
             data.ctrl[:] = follows + np.array([0, zero_rad, 0])
             mujoco.mj_step(model, data, finer)

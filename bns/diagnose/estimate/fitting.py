@@ -269,7 +269,7 @@ class Problem:
         return eliminate_clocks(self, at.model, at.whitened, out)
 
     def _slope(self, at: _Point, free: Sequence[FreeParameter], j: int, by: float) -> Array:
-        """A column of the Jacobian, (frames, 3). Where it holds a jump, or one trial rules it, each trial's slope to the flatter side.
+        """A column of the Jacobian, (frames, 3). With a jump in it, or ruled by a trial: each trial's slope to the flatter side.
 
         Far from the truth the filter is reset in some trials (`innovations`), and a change of the number by a thousandth can
         move where: a jump by more than the filter trusts any pose, whose slope says that these trials alone know the number.

@@ -15,8 +15,7 @@ from bns.physics.effect import Parameter
 from bns.physics.model import Model
 
 CHANCE = DEFAULTS.estimate.together_chance
-_NEAR = np.sqrt(2.0 * DEFAULTS.estimate.fit_settled)
-"""Standard errors: nearer to where the loss is least no fit is sure to end, since the loss rises by half their square."""
+_SETTLED = DEFAULTS.estimate.fit_settled
 
 
 def at_bound(fit: Fit, name: str) -> bool:
@@ -94,7 +93,7 @@ def _endless(fit: Fit, i: int) -> bool:
     p, value = fit.free[i].parameter, float(fit.values[i])
     if not (p.trial_share or p.floor_share):
         return False
-    near = _NEAR * fit.se(i)
+    near = np.sqrt(2.0 * _SETTLED) * fit.se(i)  # there the loss is higher by what ends a fit
     return bool(value >= p.high - near or (p.floor_axis and value <= p.low + near))
 
 

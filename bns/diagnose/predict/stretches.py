@@ -21,6 +21,7 @@ from bns.sweep.jobs.cores import cores
 
 _COARSER = DEFAULTS.predict.coarser
 _LOOK_S = DEFAULTS.predict.look_s
+Indices = NDArray[np.int64]
 _RIMS = 5.0
 """So many widths of its rim from a disc, its friction is that of the floor within 1 %; links are noted in between, too."""
 
@@ -118,7 +119,8 @@ class _Body:
 class Simulations:
     """Chosen stretches and their simulations.
 
-    A body is looked at in a stretch's first and last frame, and in between so often that chords do for other times.
+    A body is looked at in a stretch's first and last frame, and in between so often that a cubic does for other times. Chords
+    would make its ways shorter: with looks 0.04 s apart, by half a percent of a quick arm's.
     """
 
     def __init__(self, body: _Body, tracks: StretchTracks, chosen: NDArray[np.int64]) -> None:
@@ -179,11 +181,27 @@ class Simulations:
         offset = np.concatenate([[0.0], np.cumsum(self._look_s[self._first[1:] - 1] + 1.0)])
         of_look = np.repeat(np.arange(len(self)), self._counts)
         at = np.searchsorted(self._look_s + offset[of_look], since + offset[stretch], side="right")
-        upper = np.clip(at, first + 1, last)
-        lower = upper - 1
-        share = (since - self._look_s[lower]) / np.maximum(self._look_s[upper] - self._look_s[lower], 1e-12)
-        out: Array = points_m[lower] + share[:, None, None] * (points_m[upper] - points_m[lower])
-        return out
+        return _between(points_m, self._look_s, since, np.clip(at, first + 1, last) - 1, first, last)
+
+
+def _between(points_m: Array, look_s: Array, since_s: Array, lower: Indices, first: Indices, last: Indices) -> Array:
+    """Points (frames, ...) at times since_s (frames,) from those of looks, points_m (looks, ...) at look_s (looks,).
+
+    On the cubic through the two looks around each, ``lower`` (frames,) and the next, and one to either side; of fewer looks from
+    ``first`` to ``last`` (frames,) on the curve through all.
+    """
+    begin = np.clip(lower - 1, first, np.maximum(last - 3, first))
+    nodes = [np.minimum(begin + k, last) for k in range(4)]
+    out = np.zeros((len(since_s), *points_m.shape[1:]))
+    for k, node in enumerate(nodes):
+        weight = np.where(begin + k <= last, 1.0, 0.0)
+        for j, other in enumerate(nodes):
+            if j != k:
+                apart = np.where(begin + j <= last, look_s[node] - look_s[other], 1.0)
+                away = np.where(begin + j <= last, since_s - look_s[other], 1.0)
+                weight *= away / np.where(apart == 0.0, 1.0, apart)
+        out += weight.reshape(-1, *(1,) * (points_m.ndim - 1)) * points_m[node]
+    return out
 
 
 def _comes_near(place: Rough, box_m: Array) -> NDArray[np.bool_]:

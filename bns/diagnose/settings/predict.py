@@ -102,10 +102,11 @@ class Predict:
         "per model, and a diagnosis needs some 60 models.",
     )
     look_s: float = setting(
-        0.04,
+        0.02,
         "s",
-        "Time between the recorded states of a simulated body; camera frames in between are interpolated linearly; "
-        f"{BY_HAND}.",
+        "Time between the recorded states of a simulated body; camera frames in between lie on a cubic through four of them. On "
+        "straight lines through states 0.04 s apart, an arm's own simulation, seen at 30 Hz, moved 0.4 % too far; on cubics "
+        "through these, by less than 0.07 % of the loss under a noise of 0.05 mm.",
     )
     wild_m: float = setting(
         0.03,
