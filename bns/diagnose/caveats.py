@@ -222,7 +222,7 @@ def _on_rest(rest: Unexplained, tracks: Tracks) -> Iterator[str]:
         if rest.shared is not None:
             yield f"{begun}. What they share: {rest.shared.in_words}. Look at what the robot does after such commands."
         elif rest.place is not None:
-            yield f"{begun}. What they share: {rest.place.in_words}. Look at what differs there: the floor, tracking, a cable."
+            yield f"{begun}. What they share: {rest.place.in_words}. {rest.place.to_look_for}"
         elif len(rest.outliers) >= OFTEN * len(tracks):
             yield f"{begun}. That is too often for accidents: look for what they share, such as a place or a change of command."
         else:

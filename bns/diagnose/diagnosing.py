@@ -19,7 +19,7 @@ from bns.diagnose.outcome import alike_in_metres, outcome_of, predicts_better_th
 from bns.diagnose.parallel import one_thread_each
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.residuals.drive_scatter import scatter_in_words
+from bns.diagnose.residuals.drive_scatter import scatter_in_words, still_left_in_words
 from bns.diagnose.residuals.earned_terms import curve_does_better
 from bns.diagnose.residuals.together import formula_in_words, said_of
 from bns.diagnose.residuals.worst_in_words import on_many_apart, on_worst
@@ -105,8 +105,12 @@ def _diagnosed(
     pairs = [] if left else _longer(found.selection, listed(found.selection.nominal.model, extra, predictor.tracks, barred))
     notes = [*notes_on(found, predictor.tracks, hint, pairs, said.sentences, slight, formula)]
     verdict = _verdict(found.selection, left, hint)
-    if verdict not in {"unlisted", "insufficient-data"} and isinstance(predictor, WheelPredictor):
-        notes += scatter_in_words(predictor, found.selection.problem.pose_filter.noise, found.errors)
+    if verdict != "insufficient-data" and isinstance(predictor, WheelPredictor):
+        noise, with_terms = found.selection.problem.pose_filter.noise, found.errors_with_terms
+        if verdict != "unlisted":
+            notes += scatter_in_words(predictor, noise, found.errors)
+        elif with_terms is not None and with_terms.falls_in_the_end:
+            notes += still_left_in_words(predictor, noise, with_terms)
     presented = presented_fit(found.selection, found.terms, found.errors_with_terms)
     contradicted = fitted_again(model, presented, contradicted=True) if found.terms or found.selection.accepted else ()
     return Diagnosis(

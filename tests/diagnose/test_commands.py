@@ -1,12 +1,14 @@
 """The commands as a user types them: models that come back, figures, refusals with exit code 2."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
 import bns
+from bns.cli.commands.diagnose import _why_not
 from bns.cli.main import main
 from bns.measurements import write_measurements
 from bns.physics.formula import formula_effect
@@ -76,6 +78,21 @@ def test_a_diagnosis_writes_the_model_that_it_found_and_says_how(data, tmp_path,
     capsys.readouterr()
     assert main(["diagnose", str(data), "--model", str(new), "-o", str(tmp_path / "more.yaml")]) == 0
     assert "Nothing was found to add, so" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("verdict", "fell", "said"),
+    [
+        ("unlisted", ("trial",), "What was found lowers some errors and raises others (see the notes)"),
+        ("unlisted", (), "Nothing that was found lowers the error"),
+        ("unlisted", None, "Nothing that was found lowers the error"),
+        ("none", ("trial",), "Nothing was found to add"),
+    ],
+)
+def test_why_no_model_is_written_is_said(verdict, fell, said):
+    with_terms = None if fell is None else SimpleNamespace(fell_in_the_end=fell)
+    found = SimpleNamespace(verdict=verdict, diagnosis=SimpleNamespace(errors_with_terms=with_terms))
+    assert _why_not(found) == said
     assert not (tmp_path / "more.yaml").exists()
     refitted = bns.diagnose(data, new)
     assert refitted.model.values_of("turn-slip")["slip_s"] == refitted.parameters.set_index("parameter").value["slip_s"]

@@ -51,11 +51,11 @@ def log(
     told_rad_s: float = np.inf,
     seen_every: int = 10,
 ) -> pd.DataFrame:
-    """Random set points every 0.48 s, seen every ``seen_every`` steps of 4 ms (25 Hz); the elbow's zero may be off, its servo weak or of a lower gain.
+    """Random set points every 0.48 s, seen at 25 Hz; the elbow's zero may be off, its servo weak or of a lower gain.
 
-    ``friction_n_m``: dry friction in each joint. ``carried_kg``: at the hand. ``finer``: with steps so many times shorter than
-    the model's, and another integrator. ``speed_rad_s``: of the servos, which go from set point to set point no faster;
-    ``told_rad_s``: of the set points themselves.
+    ``seen_every``: steps of 4 ms from one frame to the next. ``friction_n_m``: dry friction in each joint. ``carried_kg``: at the
+    hand. ``finer``: with steps so many times shorter than the model's, and another integrator. ``speed_rad_s``: of the servos,
+    which go from set point to set point no faster; ``told_rad_s``: of the set points themselves.
     """
     rng, rows = np.random.default_rng(seed), []
     model = mujoco.MjModel.from_xml_string(loaded(xml(), "hand", carried_kg) if carried_kg else xml())

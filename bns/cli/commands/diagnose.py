@@ -150,12 +150,21 @@ def _where_written(options: argparse.Namespace, found: DiagnoseResult) -> str:
     extended = found.extended
     if options.output is not None:
         if extended is None:
-            what = "Nothing that was found lowers the error" if found.verdict == "unlisted" else "Nothing was found to add"
-            return f"\n{what}, so {options.output} was not written.\n"
+            return f"\n{_why_not(found)}, so {options.output} was not written.\n"
         return f"\n{_written(options)}{_which(found)}\n"
     if extended is None:
         return ""
     return f"\nTo write the model with all this: {shlex.join(['bns', *options.command_line, '-o', 'extended.yaml'])}\n"
+
+
+def _why_not(found: DiagnoseResult) -> str:
+    """Why there is no model with more than the given one has."""
+    if found.verdict != "unlisted":
+        return "Nothing was found to add"
+    with_terms = found.diagnosis.errors_with_terms
+    if with_terms is not None and with_terms.fell_in_the_end:
+        return "What was found lowers some errors and raises others (see the notes)"
+    return "Nothing that was found lowers the error"
 
 
 def _written(options: argparse.Namespace) -> str:

@@ -94,3 +94,22 @@ def scatter_in_words(predictor: Predictor, noise: Array, errors: PairedErrors) -
         f"with the root of the way, which makes {1e3 * by_drive:.3g} mm. No model predicts such scatter: no listed effect and "
         "no curve finds a pattern in it."
     ]
+
+
+def still_left_in_words(predictor: Predictor, noise: Array, errors: PairedErrors) -> list[str]:
+    """A sentence where terms describe what no effect does, and far more than noise and the drive's scatter is left with them.
+
+    ``errors``: of the model as given first, of that with the terms last.
+    """
+    if not far_above_noise(errors):
+        return []
+    horizon = _judged(errors)[-1]
+    at = errors.horizons[horizon]
+    given, error, floor = at.models[0].rms_m, at.models[-1].rms_m, at.noise_floor_m
+    if np.hypot(wandering_m(predictor, noise, horizon), floor) > EXPLAINS * error:
+        return []
+    return [
+        f"With all of this the error over {IN_WORDS[horizon]} is still {1e3 * error:.3g} mm (as given {1e3 * given:.3g} mm, by "
+        f"tracking noise {1e3 * floor:.3g} mm), so not all that happens is described. Something may have a state that no column "
+        "shows, such as a load that has shifted or parts that have warmed up, or may happen at moments: log what could show it."
+    ]

@@ -1,7 +1,8 @@
 """Do the moments that stand out share a place, a direction or a time? Asked of where they begin, beside where the robots drove.
 
 A marker that is mistaken behind a line, a threshold, a magnet under the floor: what the robot is told says nothing of it. But the
-moments then begin in a narrow range of one coordinate, in which the same trials spend little of their time.
+moments then begin in a narrow range of one coordinate, in which the same trials spend little of their time. Or in a part of the
+session, as when something came loose: trials before and after it have none.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ PURE = DEFAULTS.residuals.share_pure
 _X = "x is between {0:.2f} and {1:.2f} m"
 _TIME = "the trial has lasted {0:.1f} to {1:.1f} s"
 _HEADING = "the heading is between {0:.0f} and {1:.0f}°"
-_CLAUSES = (_X, "y is between {0:.2f} and {1:.2f} m", _HEADING, _TIME)
+SESSION = "the session has lasted {0:.0f} to {1:.0f} s"
+_CLAUSES = (_X, "y is between {0:.2f} and {1:.2f} m", _HEADING, _TIME, SESSION)
 """Each coordinate with its two ends, as a clause."""
 
 
@@ -33,7 +35,7 @@ class SharedPlace:
 
     ``clause``: the coordinate, with places for both ends; ``low``, ``high``: the ends in m, rad or s, those of a heading from 0
     on, the second up to two turns. ``inside`` of ``moments`` begin there, and the fraction ``usual`` of all windows of their
-    trials.
+    trials; of a part of the session, of all trials.
     """
 
     clause: str
@@ -51,13 +53,23 @@ class SharedPlace:
         if self.clause == _TIME and f"{self.low:.1f}" == f"{self.high:.1f}":
             where = f"the trial has lasted {self.low:.1f} s"
         which = "all" if self.inside == self.moments else f"{self.inside} of"
-        return f"{which} these {self.moments} moments begin where {where}; {self.usual:.0%} of the same trials is driven there"
+        driven = "what was driven is driven then" if self.clause == SESSION else "the same trials is driven there"
+        when = "when" if self.clause == SESSION else "where"
+        return f"{which} these {self.moments} moments begin {when} {where}; {self.usual:.0%} of {driven}"
+
+    @property
+    def to_look_for(self) -> str:
+        """What may differ there."""
+        if self.clause == SESSION:
+            return "Look for what was different then: a screw, a cable or a tyre that is loose, a battery, heat, a hand."
+        return "Look at what differs there: the floor, tracking, a cable."
 
 
 def shared_place(problem: Problem, judged: JudgedWindows) -> SharedPlace | None:
     """Where the worst moments of the trials begin; None where they are few, or might begin there by chance.
 
-    By chance each begins in any window of its trial. All ranges between two moments are paid for, of every coordinate.
+    By chance each begins in any window of its trial, and in any trial. All ranges between two moments are paid for, of every
+    coordinate.
     """
     from scipy.stats import binom  # noqa: PLC0415  # slow to load
 
@@ -67,12 +79,12 @@ def shared_place(problem: Problem, judged: JudgedWindows) -> SharedPlace | None:
         return None
     trial, begin, there = tracks.trial[judged.start], judged.start - 1, list(worst.values())
     found, least = None, CHANCE
-    for clause, values in zip(_CLAUSES, [*tracks.pose[begin].T, tracks.own_s[begin]], strict=True):
+    for clause, values in zip(_CLAUSES, [*tracks.pose[begin].T, tracks.own_s[begin], tracks.session_s[begin]], strict=True):
         first = _largest_gap(values[there]) if clause == _HEADING else float(values.min())
         along = np.mod(values - first, math.tau) if clause == _HEADING else values - first
         for low, high in _narrowest(along[there]):
             within = (along >= low) & (along <= high)
-            usual = float(np.mean([within[trial == one].mean() for one in worst]))
+            usual = float(within.mean() if clause == SESSION else np.mean([within[trial == one].mean() for one in worst]))
             inside = int(within[there].sum())
             chance = float(binom.sf(inside - 1, len(there), usual)) * len(_CLAUSES) * len(there) ** 2 / 2
             if chance < least:

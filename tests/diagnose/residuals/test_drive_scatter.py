@@ -12,7 +12,7 @@ from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report import text
 from bns.diagnose.report.plain_language import ABOVE_NOISE, headline, nothing_above_noise
-from bns.diagnose.residuals.drive_scatter import scatter_in_words, wandering_m
+from bns.diagnose.residuals.drive_scatter import scatter_in_words, still_left_in_words, wandering_m
 from tests.diagnose.worlds import NOMINAL, measured
 
 NOISE = np.array([0.0005, 0.002, 0.008, 0.004, 0.05])
@@ -91,6 +91,17 @@ def test_it_is_said_where_it_makes_the_error_and_the_error_is_above_noise():
     assert scatter_in_words(predictor, NOISE, errors(by_drive, floor_m=0.6 * by_drive)) == []  # near noise: no question
     assert scatter_in_words(predictor, NOISE, errors(by_drive, floor_m=np.nan)) == []
     assert scatter_in_words(predictor, NOISE, SimpleNamespace(horizons={})) == []
+
+
+def test_what_is_left_beside_terms_is_said_where_neither_noise_nor_scatter_makes_it():
+    predictor = robot(curved(), [(0, 199)])
+    by_drive = wandering_m(predictor, NOISE, "5s")
+    (said,) = still_left_in_words(predictor, NOISE, errors(1.7 * by_drive))
+    assert f"over 5 seconds is still {1.7e3 * by_drive:.3g} mm (as given 1e+03 mm, by tracking noise 2 mm)" in said
+    assert "a load that has shifted" in said
+    assert still_left_in_words(predictor, NOISE, errors(1.2 * by_drive)) == []  # the drive's own scatter
+    assert still_left_in_words(predictor, NOISE, errors(1.7 * by_drive, floor_m=by_drive)) == []
+    assert still_left_in_words(predictor, NOISE, SimpleNamespace(horizons={})) == []
 
 
 def test_a_verdict_that_finds_nothing_says_that_the_error_is_above_noise():

@@ -17,6 +17,7 @@ from bns.diagnose.residuals.shared_place import (
     _TIME,
     _X,
     FEWEST,
+    SESSION,
     SharedPlace,
     _largest_gap,
     _narrowest,
@@ -46,6 +47,18 @@ def driven(dragged, trials=30, seed=0):
             t_s += STEP_S
         rows.append(pd.DataFrame(seen, columns=["trial", "t_s", "left_m_s", "right_m_s", "x_m", "y_m", "heading_rad"]))
     return pd.concat(rows, ignore_index=True).astype({"trial": int})
+
+
+def some_of(seed):
+    """Trials 18 to 29 of 40, and in each a moment of its own."""
+    trial = [-1]
+
+    def dragged(_, t_s, luck):
+        if t_s == 0.0:
+            trial[0] += 1
+        return 18 <= trial[0] < 30 and 2.0 + 4.0 * luck < t_s < 2.5 + 4.0 * luck
+
+    return driven(dragged, trials=40, seed=seed)
 
 
 def left_in(dragged, **given):
@@ -81,6 +94,21 @@ def test_moments_at_random_share_nothing():
     assert found is None
 
 
+def test_moments_in_a_part_of_the_session_are_told_by_it():
+    problem = problem_for(WheelPredictor(tracks_of(some_of(seed=2))), NOMINAL)
+    fit = problem.fit(NOMINAL)
+    rest = unexplained(problem, fit, ())
+    assert rest.place.clause == SESSION
+    assert rest.place.in_words.startswith("all these 12 moments begin when the session has lasted ")
+    assert rest.place.in_words.endswith("of what was driven is driven then")
+    assert 0.25 < rest.place.usual < 0.32
+    begin = problem.predictor.tracks.start_s
+    assert begin[18] < rest.place.low < begin[19]
+    assert begin[29] < rest.place.high
+    (note,) = (one for one in caveats._on_rest(rest, problem.predictor.tracks) if "What they share" in one)
+    assert note.endswith("a battery, heat, a hand.")
+
+
 @pytest.mark.parametrize(("moments", "found"), [(FEWEST - 1, False), (FEWEST, True)])
 def test_few_moments_could_share_one_by_chance(moments, found):
     """A trial each, of 100 windows along x; the one near 0.5 m stands out, in all that have one."""
@@ -88,7 +116,8 @@ def test_few_moments_could_share_one_by_chance(moments, found):
     x = np.tile(np.linspace(0.0, 1.0, 100), moments)
     rng = np.random.default_rng(0)
     pose = np.column_stack([x, rng.uniform(size=len(x)), rng.uniform(-3, 3, len(x))])
-    tracks = SimpleNamespace(trial=windows // 100, pose=pose, own_s=rng.uniform(0, 10, len(x)), relative=False)
+    own_s = rng.uniform(0, 10, len(x))
+    tracks = SimpleNamespace(trial=windows // 100, pose=pose, own_s=own_s, session_s=own_s, relative=False)
     tracks.trial = np.append(tracks.trial, moments - 1)  # windows begin at the frame after a pose
     stands_out = np.isin(windows % 100, [50])
     judged = JudgedWindows(windows + 1, np.where(stands_out, 9.0, 1.0), stands_out)
