@@ -78,21 +78,6 @@ def test_a_diagnosis_writes_the_model_that_it_found_and_says_how(data, tmp_path,
     capsys.readouterr()
     assert main(["diagnose", str(data), "--model", str(new), "-o", str(tmp_path / "more.yaml")]) == 0
     assert "Nothing was found to add, so" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("verdict", "fell", "said"),
-    [
-        ("unlisted", ("trial",), "What was found lowers some errors and raises others (see the notes)"),
-        ("unlisted", (), "Nothing that was found lowers the error"),
-        ("unlisted", None, "Nothing that was found lowers the error"),
-        ("none", ("trial",), "Nothing was found to add"),
-    ],
-)
-def test_why_no_model_is_written_is_said(verdict, fell, said):
-    with_terms = None if fell is None else SimpleNamespace(fell_in_the_end=fell)
-    found = SimpleNamespace(verdict=verdict, diagnosis=SimpleNamespace(errors_with_terms=with_terms))
-    assert _why_not(found) == said
     assert not (tmp_path / "more.yaml").exists()
     refitted = bns.diagnose(data, new)
     assert refitted.model.values_of("turn-slip")["slip_s"] == refitted.parameters.set_index("parameter").value["slip_s"]
@@ -256,3 +241,18 @@ def test_comparisons_that_make_no_sense_are_refused(tmp_path, change, message, c
     write_measurements(change(measured(NOMINAL, trials=10)), tmp_path / "m.csv")
     assert main(["compare", str(tmp_path / "m.csv"), "--model", "khepera"]) == 2
     assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("verdict", "fell", "said"),
+    [
+        ("unlisted", ("trial",), "What was found lowers some errors and raises others (see the notes)"),
+        ("unlisted", (), "Nothing that was found lowers the error"),
+        ("unlisted", None, "Nothing that was found lowers the error"),
+        ("none", ("trial",), "Nothing was found to add"),
+    ],
+)
+def test_why_no_model_is_written_is_said(verdict, fell, said):
+    with_terms = None if fell is None else SimpleNamespace(fell_in_the_end=fell)
+    found = SimpleNamespace(verdict=verdict, diagnosis=SimpleNamespace(errors_with_terms=with_terms))
+    assert _why_not(found) == said

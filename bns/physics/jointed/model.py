@@ -47,6 +47,11 @@ class JointedModel(Model):
         return known[name]
 
     @property
+    def free(self) -> bool:
+        """Does it lie free on a floor?"""
+        return machine(self.mechanism).free
+
+    @property
     def plant(self) -> Plant:
         """Servos, links and floor with the effects switched on."""
         plant = machine(self.mechanism).plant

@@ -90,7 +90,8 @@ def made_up(intervals):
     """A fit of warm-up's numbers, loss (-1 to 1) and time_s (0.1 to 600), with these intervals."""
     free = tuple(FreeParameter("warm-up", p) for p in effect_named("warm-up").parameters)
     values = [sum(ends) / 2 for ends in intervals]
-    return SimpleNamespace(free=free, values=values, interval=lambda i: intervals[i])
+    se = [(high - low) / 4 for low, high in intervals]
+    return SimpleNamespace(free=free, values=values, interval=lambda i: intervals[i], se=lambda i: se[i])
 
 
 def test_numbers_that_may_be_anything_are_not_determined():
