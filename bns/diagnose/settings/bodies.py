@@ -60,6 +60,19 @@ class Bodies:
         "Tracks of a robot with position-controlled joints are cut into stretches of this length. Each is simulated "
         "from where the robot was seen: long enough for the robot to move, short enough to be predicted.",
     )
+    sites_clear: float = setting(
+        0.25,
+        "1",
+        "Poses of a body are left out where its first and its last site are nearer to one another than this fraction of their "
+        f"median distance: there its heading has four times the usual noise; {BY_HAND}.",
+    )
+    sites_clear_at_begin: float = setting(
+        0.5,
+        "1",
+        "No stretch of a body begins where its sites are nearer than this fraction of that distance: its heading turns all that "
+        "is measured in the stretch. An arm whose sites came within 9 mm of one another in plan view was 39 mm off in one "
+        "stretch, and 3 mm elsewhere.",
+    )
     run_up_postures: int = setting(
         6,
         "postures",

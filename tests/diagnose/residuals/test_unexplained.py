@@ -1,6 +1,7 @@
 """What is left is seen: moments that stand out, what follows an event, what brakes the robot whichever way it goes."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -12,11 +13,17 @@ from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.significance import PairedComparison
 from bns.diagnose.predict.wheels import RECENT_S, WheelPredictor
+from bns.diagnose.residuals import unexplained as rest_module
 from bns.diagnose.residuals.along_variables import SHARE, ResidualDependence, probe_effect, significant_dependence
 from bns.diagnose.residuals.autocorrelation import Autocorrelation, _moves, _period
 from bns.diagnose.residuals.outliers import FAR, TRIALS, WIDTH, _windows, moment_at, outliers
 from bns.diagnose.residuals.unexplained import NOTHING, unexplained
+from bns.physics.jointed.mechanism import Mechanism
+from bns.physics.jointed.model_files import load_body
 from tests.diagnose.worlds import FRAME_S, NOMINAL, measured
+from tests.jointed.arm import xml
+
+SNAKE = load_body("snake")
 
 KICK_S, KICK_RAD = 1.6, 0.15
 
@@ -122,6 +129,25 @@ def largest(table):
     predictor = WheelPredictor(tracks_of(table))
     problem = problem_for(predictor, NOMINAL)
     return unexplained(problem, problem.fit(NOMINAL), ()).autocorrelation
+
+
+@pytest.mark.parametrize(
+    ("body", "period_s", "counts"), [("snake", None, False), ("snake", 0.4, True), ("arm", None, True), ("wheels", None, True)]
+)
+def test_what_only_drifts_on_counts_where_no_floor_makes_it(body, period_s, counts, monkeypatch):
+    """A body on a floor touches it a little otherwise each time, and goes on otherwise."""
+    model = {
+        "snake": SNAKE,
+        "arm": replace(SNAKE, name="arm", mechanism=Mechanism(xml(), ("elbow", "hand"))),
+        "wheels": NOMINAL,
+    }[body]
+    alike = Autocorrelation("heading", "within", 3, 0.33, 9.0, period_s)
+    monkeypatch.setattr(rest_module, "autocorrelations", lambda *_: [alike])
+    monkeypatch.setattr(rest_module, "_moments", lambda *_: ((), None, None))
+    monkeypatch.setattr(rest_module, "command_times", lambda *_: None)
+    rest = unexplained(None, SimpleNamespace(model=model), ())
+    assert rest.any is counts
+    assert rest.autocorrelation is (alike if counts else None)
 
 
 @pytest.mark.parametrize("jitter", [0.002, 0.02])

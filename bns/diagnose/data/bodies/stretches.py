@@ -21,6 +21,8 @@ from bns.robots.snake.table import GAIT
 
 _LASTS_S = DEFAULTS.data.stretch_s
 _RUN_UP = DEFAULTS.data.run_up_postures
+_CLEAR = DEFAULTS.data.sites_clear
+_BEGIN_CLEAR = DEFAULTS.data.sites_clear_at_begin
 MOST_ABOUT = DEFAULTS.data.stretch_variables
 
 
@@ -167,11 +169,16 @@ def stretches_of_cycles(tracks: CycleTracks, mechanism: Mechanism, joints: int) 
 
 
 def stretches_of_joints(tracks: JointTracks, mechanism: Mechanism, joints: Sequence[str]) -> StretchTracks:
-    """Trials cut into stretches of some seconds; what was told shortly before one brings the joints to where they are."""
+    """Trials cut into stretches of some seconds; what was told shortly before one brings the joints to where they are.
+
+    The direction from the first site to the last is the heading: no stretch begins where they are near to one another, as those
+    of an arm may be that is seen from above, and poses where they nearly coincide are left out.
+    """
     columns = [tracks.joints.index(name) for name in joints]
     order = [tracks.sites.index(name) for name in mechanism.sites]
     points, since, number, times, of = [], [], [], [], []
     told: list[SetPoints] = []
+    clear = _clear(tracks.points_m[:, order])
     for trial in range(len(tracks)):
         frames = np.arange(tracks.first[trial], tracks.first[trial + 1])
         t = tracks.t_s[frames]
@@ -180,6 +187,10 @@ def stretches_of_joints(tracks: JointTracks, mechanism: Mechanism, joints: Seque
             inside = frames[(t >= begin) & (t < begin + _LASTS_S)]
             if len(inside) < 2 or (tracks.jumped is not None and tracks.jumped[inside[1:]].any()):
                 continue  # too few poses, or some in between were left out
+            inside = inside[np.cumsum(clear[inside] >= _BEGIN_CLEAR) > 0]
+            inside = inside[clear[inside] >= _CLEAR]
+            if len(inside) < 2:
+                continue
             from_s, to_s = tracks.t_s[inside[0]], tracks.t_s[inside[-1]]
             points.append(tracks.points_m[inside][:, order])
             since.append(tracks.t_s[inside] - from_s)
@@ -191,6 +202,13 @@ def stretches_of_joints(tracks: JointTracks, mechanism: Mechanism, joints: Seque
         raise DataError(f"No trial lasts {RUN_UP_S + _LASTS_S:g} s, for a stretch and the time before it; give longer trials.")
     about = {f"{name}{SET}": np.array([s.at_begin[k] for s in told]) for k, name in enumerate(joints[:MOST_ABOUT])}
     return _joined(tracks, np.array(of, dtype=np.int64), points, since, number, times, told, about)
+
+
+def _clear(points_m: Array) -> Array:
+    """How far the first site is from the last in each frame, as a share of what is usual, (frames,); 1 for a single site."""
+    apart_m = np.hypot(*(points_m[:, -1] - points_m[:, 0]).T)
+    usual_m = float(np.median(apart_m)) if len(apart_m) else 0.0
+    return apart_m / usual_m if usual_m > 0 else np.ones(len(points_m))
 
 
 def _joined(
