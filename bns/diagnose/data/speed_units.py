@@ -52,8 +52,16 @@ def mistakes() -> tuple[Mistake, ...]:
     return (
         Mistake(SIZES["km/h"], "km/h", _entry("km/h")),
         Mistake(1 / SIZES["km/h"], "m/s that were taken for km/h", _converted("km/h", SIZES["km/h"])),
-        Mistake(rpm, "turns per minute (rpm) taken for rad/s", f"multiply `scale` (the wheel's radius) by {rpm:.5f}"),
-        Mistake(1 / rpm, "rad/s that were taken for turns per minute (rpm)", f"divide `scale` by {rpm:.5f}"),
+        Mistake(
+            rpm,
+            "turns per minute (rpm) taken for rad/s, or mm/s taken for cm/s",
+            f"multiply `scale` (the wheel's radius) by {rpm:.5f}, or give `unit: mm/s`",
+        ),
+        Mistake(
+            1 / rpm,
+            "rad/s that were taken for turns per minute (rpm), or cm/s taken for mm/s",
+            f"divide `scale` by {rpm:.5f}, or give `unit: cm/s`",
+        ),
         Mistake(SIZES["in/s"], "in/s", _entry("in/s")),
         Mistake(a_minute, "metres per minute, or turns per minute taken for turns per second", "multiply `scale` by 0.016667"),
         Mistake(1 / a_minute, "speeds per second that were taken for speeds per minute", "multiply `scale` by 60"),

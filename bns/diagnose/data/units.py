@@ -17,6 +17,7 @@ from bns.measurements import COMMANDS, POSE
 
 FASTEST_M_S = DEFAULTS.data.fastest_m_s
 _LONG_STEP_S = DEFAULTS.data.long_step_s
+_SHORT_STEP_S = DEFAULTS.data.short_step_s
 _LONGEST_TRIAL_S = DEFAULTS.data.longest_trial_s
 _FINER = DEFAULTS.data.finer_units
 _UNTOLD_RATIO = DEFAULTS.data.untold_ratio
@@ -29,6 +30,7 @@ _DEGREES_AT_LEAST = DEFAULTS.data.degrees_rad_m
 _MINUTES = DEFAULTS.data.minutes_ratio
 _HUNDREDTHS = DEFAULTS.data.hundredths_ratio
 _BEYOND = DEFAULTS.data.lengths_beyond
+_FEWEST = DEFAULTS.predict.robot_fewest
 _DEGREES_BEYOND = DEFAULTS.data.degrees_beyond
 
 
@@ -53,7 +55,9 @@ def check_units(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -
             "commanded. Are the commands in separate rows? `hold_commands_s: .inf` in the mapping of `bns import` keeps "
             "each until the next."
         )
+    _refuse_short_steps(step, ratio)
     refuse_unlike_axes(driven.forward_m, *moved)  # before any advice that takes the way for one length
+    _refuse_unlike_wheels(ways, driven, *moved)
     if step >= 1.0 and 1 / 3000 < ratio < 1 / 300:
         raise DataError(_apart(step, "milliseconds"))
     if speed > FASTEST_M_S:
@@ -73,7 +77,7 @@ def check_units(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -
             raise DataError(f"The robot went {ratio:.0f} times as far as commanded, and turns as much further: {slow}")
         raise DataError(
             f"The robot went {ratio:.0f} times as far as commanded: x_m and y_m look like {name}; they must be metres. "
-            f"{_cure('x_m', unit)}"
+            f"{_cure('x_m', unit)}{_by_turns(ways, driven)}"
         )
     if 0 < ratio < _SLOWEST and _correlation(ways[:, 0], ways[:, 1]) > _ALIKE:
         hundredths = _HUNDREDTHS[0] < ratio < _HUNDREDTHS[1]
@@ -87,7 +91,7 @@ def check_units(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -
         raise DataError(
             f"The robot went {ratio:.2g} times as far as commanded, in proportion: left_m_s and right_m_s look like {looks}; "
             "they must be metres per second. In a mapping of `bns import`, give "
-            f"{cure}."
+            f"{cure}.{_by_turns(ways, driven)}"
         )
     if _turns_as_degrees(table):
         raise DataError(
@@ -102,6 +106,55 @@ def check_units(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -
         if same < -0.5:
             raise DataError(opposite_turns(driven.forward_m, *moved))
     return speed_note(driven)
+
+
+def _by_turns(ways: np.ndarray, driven: Ways) -> str:
+    """What tells speeds in another unit from positions in another one: the wheelbase that the turns fit; "" if none did."""
+    (ratios, _), (told, seen) = driven.ratios, np.abs(ways[:, 2:]).T
+    small = (told > 0) & (seen > 0) & (seen < np.pi / 2)
+    if min(small.sum(), len(ratios)) < _FEWEST:
+        return ""
+    ratio = float(np.median(ratios))
+    base_m = float(told[small].sum() / seen[small].sum())
+    return (
+        f" The turns decide: if the wheels are about {base_m:.2g} m apart, the speeds are right, and x_m and y_m are not (they "
+        f"are {ratio:.2g} times what they must be); if about {base_m * ratio:.2g} m, the speeds are not."
+    )
+
+
+def _refuse_unlike_wheels(ways: np.ndarray, driven: Ways, halfway_rad: np.ndarray, moved_m: np.ndarray) -> None:
+    """DataError if one wheel takes the robot many times as far as the other one does: their columns are in different units."""
+    half = np.abs(driven.turned_rad) / 2
+    small = half < np.pi / 4
+    left, right = driven.forward_m - ways[:, 2] / 2, driven.forward_m + ways[:, 2] / 2
+    ahead = (moved_m[:, 0] * np.cos(halfway_rad) + moved_m[:, 1] * np.sin(halfway_rad)) / np.sinc(half / np.pi)
+    told = np.column_stack([left, right])[small]
+    if small.sum() < _FEWEST or np.linalg.matrix_rank(told) < 2:
+        return
+    of_left, of_right = np.linalg.lstsq(told, ahead[small], rcond=None)[0]
+    alike = told.sum(axis=1)
+    off = ahead[small] - alike * float(alike @ ahead[small] / max(alike @ alike, 1e-300))
+    left_off = ahead[small] - told @ [of_left, of_right]
+    if of_left <= 0 or of_right <= 0 or left_off @ left_off > (1.0 - _ALIKE) * (off @ off):
+        return
+    ratio = float(of_left / of_right)
+    if max(ratio, 1 / ratio) > 1 / _SLOWEST and mistake_of(ratio, _WITHIN) is not None:
+        most, least = ("left", "right") if ratio > 1 else ("right", "left")
+        raise DataError(
+            f"For each metre commanded, the {most} wheel takes the robot {max(ratio, 1 / ratio):.2g} times as far as the {least} "
+            "one: left_m_s and right_m_s are not in the same unit. In the mapping LOG.import.yaml (`bns import`), give both the "
+            "same `unit` and `scale`."
+        )
+
+
+def _refuse_short_steps(step_s: float, ratio: float) -> None:
+    """DataError if rows are nearer to one another than any tracker's, and the robot goes ``ratio`` times as far, too far."""
+    if step_s < _SHORT_STEP_S and ratio > 1 / _SLOWEST:
+        raise DataError(
+            f"Successive rows are {step_s:.2g} s apart, and the robot goes {ratio:.0f} times as far in them as commanded: t_s "
+            "looks like milliseconds that were taken for microseconds, or seconds for milliseconds; it must be seconds. In the "
+            "mapping LOG.import.yaml (`bns import`), give t_s the unit that its column has."
+        )
 
 
 def _apart(step_s: float, unit: str) -> str:

@@ -28,6 +28,12 @@ class Checks:
     jump_near_s: float = setting(
         0.4, "s", f"A pose is judged by its neighbours only if they are no further away in time than this; {BY_HAND}."
     )
+    short_step_s: float = setting(
+        5e-4,
+        "s",
+        "Rows that are nearer to one another have times in another unit, where the robot goes much farther in them than "
+        "commanded: cameras and drives log at up to 1 kHz.",
+    )
     longest_trial_s: float = setting(
         1e6,
         "s",

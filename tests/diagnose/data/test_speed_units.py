@@ -1,5 +1,7 @@
 """Speeds in another unit are told from how far robots go, before a wheelbase or an effect is blamed; a gain is no unit."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -103,3 +105,45 @@ def test_the_note_stands_before_the_refusal(tmp_path, capsys):
     assert main(["diagnose", str(tmp_path / "log.csv"), "--model", "khepera"]) == 2
     said = capsys.readouterr().err
     assert said.index("in 12 of 12 trials the robot goes") < said.index("bns: The robot goes and turns 0.28 times as far")
+
+
+@pytest.mark.parametrize(("wheel", "factor"), [("left_m_s", 10.0), ("right_m_s", 100.0), ("left_m_s", 0.01)])
+def test_wheels_in_different_units_are_refused(table, wheel, factor):
+    other = table.assign(**{wheel: table[wheel] / factor})
+    name = wheel.removesuffix("_m_s") if factor > 1 else {"left_m_s": "right"}[wheel]
+    with pytest.raises(DataError, match=rf"the {name} wheel takes the robot .* times as far .* not in the same unit"):
+        prepared(other, NOMINAL)
+
+
+def refused(table):
+    """What is said of a table that is refused; "" of one that is not."""
+    try:
+        checked(table)
+    except DataError as error:
+        return str(error)
+    return ""
+
+
+@pytest.mark.parametrize("factor", [4.0, 7.0, 1 / 3.6])
+def test_a_wheel_that_does_much_less_than_the_other_is_in_no_other_unit(table, factor):
+    assert "not in the same unit" not in refused(table.assign(left_m_s=table.left_m_s * factor))
+
+
+def test_of_wheels_that_are_always_told_alike_nobody_knows_what_each_does():
+    assert refused(measured(NOMINAL, trials=12, straight=1.0)) == ""
+
+
+@pytest.mark.parametrize(
+    ("lengths", "speeds", "base_m", "or_else"),
+    [(0.1, 1.0, r"0\.0[89]\d*", r"0\.00[89]\d*"), (1.0, 10.0, r"0\.[89]\d*", r"0\.0[89]\d*")],
+)
+def test_lengths_and_speeds_in_another_unit_are_told_apart_by_the_wheelbase(table, lengths, speeds, base_m, or_else):
+    """The Khepera's wheels are 89 mm apart: the user knows which of two wheelbases that is, and the log does not."""
+    other = scaled(table.assign(x_m=table.x_m * lengths, y_m=table.y_m * lengths), speeds)
+    said = f"wheels are about {base_m} m apart, the speeds are right, and x_m and .*; if about {or_else} m, the speeds are not"
+    assert re.search(said, refused(other)), refused(other)
+
+
+def test_times_a_thousand_times_too_short_are_told(table):
+    with pytest.raises(DataError, match="t_s looks like milliseconds that were taken for microseconds"):
+        prepared(table.assign(t_s=table.t_s / 1000), NOMINAL)
