@@ -172,10 +172,27 @@ def _check_directions(tracks: Tracks, start: NDArray[np.int64], end: NDArray[np.
             f"`{right}` in the entry heading_rad of the mapping of `bns import` turns the headings."
         )
     if abs(mirrored) > _TOGETHER and abs(beside) < 0.5:
-        raise DataError(
-            "Positions are mirrored against headings: x_m must run east, y_m north, heading_rad counter-clockwise from x. "
-            "`scale: -1` in the entry y_m (or x_m) of the mapping of `bns import` turns one of them round."
-        )
+        raise DataError(f"{_MIRRORED} {_unmirrored(float(np.degrees(np.angle(mirrored))))}")
+
+
+_MIRRORED = "Positions are mirrored against headings: x_m must run east, y_m north, heading_rad counter-clockwise from x."
+
+
+def _unmirrored(degrees: float) -> str:
+    """What is mirrored, and what to do: ``degrees`` is the direction of travel as seen, and the heading, together.
+
+    With y the wrong way a heading of a is seen as -a, with x the wrong way as 180 - a, and with both exchanged as 90 - a.
+    """
+    near = round(degrees / 90) % 4 if abs(degrees - 90 * round(degrees / 90)) < 20 else None
+    if near == 0:
+        return "y_m runs the wrong way: give its entry in the mapping of `bns import` `scale: -1`."
+    if near == 2:
+        return "x_m runs the wrong way: give its entry in the mapping of `bns import` `scale: -1`."
+    if near == 1:
+        return "x_m and y_m are exchanged: exchange their columns in the mapping of `bns import`."
+    if near == 3:
+        return "x_m and y_m are exchanged, and run the wrong way: exchange their columns, and give both `scale: -1`."
+    return "`scale: -1` in the entry y_m (or x_m) of the mapping of `bns import` turns one of them round."
 
 
 def suggested_wheelbase_m(tracks: Tracks) -> float | None:

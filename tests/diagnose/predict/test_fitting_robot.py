@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bns.api.common.prepared import prepared
 from bns.diagnose.comparison import compare
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.predict.check_robot import _scale, check_same_robot, suggested_wheelbase_m
@@ -89,3 +90,22 @@ def test_a_factor_on_turns_is_the_one_that_most_of_the_turning_agrees_on():
     predicted = np.array([1.0, 0.1, -0.1, 0.2])
     assert _scale(predicted * [3.0, 2.0, 1.0, 0.5], predicted) == 3.0
     assert _scale(predicted[1:] * [2.0, 1.0, 0.5], predicted[1:]) == 0.5
+
+
+@pytest.mark.parametrize(
+    ("seen", "said"),
+    [
+        (lambda x, y: (x, -y), "y_m runs the wrong way"),
+        (lambda x, y: (-x, y), "x_m runs the wrong way"),
+        (lambda x, y: (y, x), "x_m and y_m are exchanged: exchange"),
+        (lambda x, y: (-y, -x), "x_m and y_m are exchanged, and run the wrong way"),
+        (lambda x, y: (0.6 * x + 0.8 * y, 0.8 * x - 0.6 * y), "in the entry y_m (or x_m)"),  # a mirror that stands askew
+    ],
+)
+def test_positions_that_are_mirrored_are_told_how(seen, said):
+    table = measured(NOMINAL, trials=12, commands=8)
+    x, y = seen(table.x_m, table.y_m)
+    with pytest.raises(DataError) as refused:
+        prepared(table.assign(x_m=x, y_m=y), NOMINAL)
+    assert "Positions are mirrored against headings" in str(refused.value)
+    assert said in str(refused.value)
