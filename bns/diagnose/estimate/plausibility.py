@@ -88,6 +88,26 @@ def limiting(fit: Fit, name: str) -> bool:
     return any(_spans(fit, i) or _endless(fit, i) for i in own)
 
 
+def half_as_far(fit: Fit, name: str) -> Model | None:
+    """The model with places of an effect that are as far away as they may be bounded at half of that; None where none is.
+
+    Where even these are worse, the log does set an end to it: nearer than that, the effect is not what was driven.
+    """
+    ends = {n.parameter.name for i, n in enumerate(fit.free) if n.effect == name and n.parameter.floor_axis and _endless(fit, i)}
+    if not ends:
+        return None
+    active = next(a for a in fit.model.effects if a.effect.name == name)
+    numbers = active.effect.parameters
+    bounded = tuple(replace(p, low=_halved(p, p.low), high=_halved(p, p.high)) if p.name in ends else p for p in numbers)
+    values = (float(np.clip(active.by_name[p.name], p.low, p.high)) for p in bounded)
+    return fit.model.with_active(replace(active.effect, parameters=bounded), tuple(values))
+
+
+def _halved(p: Parameter, end: float) -> float:
+    """Half as far from the middle of where it may be."""
+    return (end + (p.low + p.high) / 2) / 2
+
+
 def _endless(fit: Fit, i: int) -> bool:
     """Whether a number's only end is the log's: it is there, as nearly as a fit comes to where the loss is least."""
     p, value = fit.free[i].parameter, float(fit.values[i])

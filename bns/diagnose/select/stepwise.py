@@ -20,7 +20,7 @@ from bns.diagnose.estimate.clocks.trial_clock_test import (
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.lacking import fit_without
-from bns.diagnose.estimate.plausibility import believable, limiting
+from bns.diagnose.estimate.plausibility import believable, half_as_far, limiting
 from bns.diagnose.estimate.problem import settled_problem
 from bns.diagnose.estimate.significance import MIN_Z
 from bns.diagnose.estimate.starts import listed
@@ -228,14 +228,19 @@ class StepwiseSelection:
         """Explanations of the same size, one effect exchanged, which these tracks, or errors, cannot tell from it.
 
         What comes in must have earned its place: where trials disagree, much that earns nothing certain is no worse for certain.
-        Nor may one with more numbers have one that may be anything: a warm-up of any length at all is a gain. Where a number is
-        outside of what is plausible, it is the best plausible one that competes: a motor that never cools is a battery that sags.
+        Nor may one with more numbers have one that may be anything: a warm-up of any length at all is a gain; a cable that is as
+        far away as any competes if one half as far away does. Where a number is outside of what is plausible, it is the best
+        plausible one that competes: a motor that never cools is a battery that sags.
         """
         competing_models: list[tuple[tuple[str, ...], Fit]] = []
         lacking = cache(partial(fit_without, problem, fit))
-        for name, other, tried in self._exchanges.of(problem, fit, accepted):
-            if len(tried.free) > len(fit.free) and limiting(tried, other):
-                continue
+        for name, other, found in self._exchanges.of(problem, fit, accepted):
+            tried = found
+            if len(found.free) > len(fit.free) and limiting(found, other):
+                nearer = half_as_far(found, other)
+                if nearer is None:
+                    continue
+                tried = problem.fit(nearer)
             # at a bound it may be: a tether from ever farther away is a slope
             may = not self._acceptance.rejected(tried, other, bounds=False) and self._acceptance.earned_over(
                 problem, lacking(name), tried, other

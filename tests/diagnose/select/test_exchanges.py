@@ -177,10 +177,28 @@ def test_no_explanation_competes_by_one_more_number_that_may_be_anything(monkeyp
     fit, tried = SimpleNamespace(free=[1]), SimpleNamespace(free=[1] * numbers)
     search._exchanges = SimpleNamespace(of=lambda *_: [("b", "c", tried)])
     search._acceptance = SimpleNamespace(rejected=lambda *_, **__: "", earned_over=lambda *_: True)
-    for name, answer in (("limiting", anything), ("indistinguishable", True), ("fit_without", None), ("believable", None)):
+    asked = {"limiting": anything, "half_as_far": None, "indistinguishable": True, "fit_without": None, "believable": None}
+    for name, answer in asked.items():
         monkeypatch.setattr(stepwise, name, lambda *_, answer=answer: answer)
     found = search._competing_models(None, fit, ("a", "b", "d"))
     assert found == ([(("a", "c", "d"), tried)] if competes else [])
+
+
+@pytest.mark.parametrize("competes", [True, False])
+def test_a_cable_as_far_away_as_any_competes_if_one_half_as_far_away_does(monkeypatch, competes):
+    search = StepwiseSelection.__new__(StepwiseSelection)
+    fit, found = SimpleNamespace(free=[1]), SimpleNamespace(free=[1, 2], name="as far")
+    nearer = SimpleNamespace(free=[1, 2], name="nearer")
+    search._exchanges = SimpleNamespace(of=lambda *_: [("b", "c", found)])
+    search._acceptance = SimpleNamespace(rejected=lambda *_, **__: "", earned_over=lambda *_: True)
+    alike = {"as far": True, "nearer": competes}
+    asked = {"limiting": lambda *_: True, "half_as_far": lambda *_: "bounded", "believable": lambda *_: None}
+    asked |= {"indistinguishable": lambda one, *_: alike[one.name], "negligibly_worse": lambda *_: False}
+    asked["fit_without"] = lambda *_: None
+    for name, answer in asked.items():
+        monkeypatch.setattr(stepwise, name, answer)
+    problem = SimpleNamespace(fit=lambda model: {"bounded": nearer}[model])
+    assert search._competing_models(problem, fit, ("a", "b")) == ([(("a", "c"), nearer)] if competes else [])
 
 
 @pytest.mark.parametrize(("alike", "competes"), [("as found", False), ("held", True)])
