@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.estimate.clocks.trial_clock_test import steps_of
 from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.noise import Whitening
@@ -30,7 +31,7 @@ def held_out_steps(predictor: Predictor, pose_filter: Whitening, model: Model) -
     trials = len(predictor.tracks)
     if not model.effects or trials < 2:
         return predictor.steps(model)
-    fold = np.arange(trials) % min(FOLDS, trials)
+    fold = folds(predictor.tracks)
     held_out = [(fold == one)[predictor.tracks.trial] for one in np.unique(fold)]
 
     def predicted(frames: NDArray[np.bool_]) -> Steps:
@@ -46,6 +47,18 @@ def held_out_steps(predictor: Predictor, pose_filter: Whitening, model: Model) -
             apart = np.zeros_like(steps.apart_m) if apart is None else apart
             apart[frames] = steps.apart_m[frames]
     return Steps(body, drift, apart)
+
+
+def folds(tracks: Tracks) -> NDArray[np.int64]:
+    """Which fold each trial is held out with, (trials,): every fifth of them.
+
+    Pieces of one trial share what was peculiar to it, so that they are held out together; those of a single one in five blocks.
+    """
+    each_one = np.arange(len(tracks))
+    if tracks.lead_s is None:
+        return each_one % min(FOLDS, len(tracks))
+    of = np.cumsum(np.append(True, tracks.lead_s[1:] <= 0.0)) - 1
+    return of % FOLDS if of[-1] > 0 else each_one * min(FOLDS, len(tracks)) // len(tracks)
 
 
 @dataclass(frozen=True)

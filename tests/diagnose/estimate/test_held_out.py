@@ -1,13 +1,16 @@
 """Errors on held-out trials come from fits that have not seen these trials."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from bns.diagnose.data.checks import checked
+from bns.diagnose.data.split_trials import split
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.estimate.cross_validation import FOLDS, held_out_steps
+from bns.diagnose.estimate.cross_validation import FOLDS, folds, held_out_steps
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.predict.wheels import WheelPredictor
 from tests.diagnose.worlds import NOMINAL, hidden, measured
@@ -70,3 +73,42 @@ def test_trials_that_do_not_count_have_no_part_in_what_is_predicted_of_any():
     pose_filter = problem_for(plain, MODEL).pose_filter
     of_plain, of_odd = (held_out_steps(one, pose_filter, MODEL).body for one in (plain, odd))
     np.testing.assert_allclose(of_odd, of_plain, rtol=1e-9, atol=1e-12)
+
+
+class Pieces(SimpleNamespace):
+    """Tracks of so many trials, with what was driven before each begins (s)."""
+
+    def __len__(self):
+        return 12
+
+
+@pytest.mark.parametrize(
+    ("lead_s", "expected"),
+    [
+        (None, [0, 1, 2, 3, 4, 0, 1, 2, 3, 4, 0, 1]),
+        ([0, 2, 2, 0, 2, 2, 2, 2, 0, 2, 0, 2], [0, 0, 0, 1, 1, 1, 1, 1, 2, 2, 3, 3]),  # four trials in pieces
+        ([0, 2, 0, 2, 0, 2, 0, 2, 0, 2, 0, 2], [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 0, 0]),  # six
+        ([0] + [2] * 11, [0, 0, 0, 1, 1, 2, 2, 2, 3, 3, 4, 4]),  # one
+        ([2] * 12, [0, 0, 0, 1, 1, 2, 2, 2, 3, 3, 4, 4]),  # one whose beginning is not in the log
+    ],
+)
+def test_pieces_of_a_trial_are_held_out_together(lead_s, expected):
+    tracks = Pieces(lead_s=None if lead_s is None else np.array(lead_s, dtype=float))
+    assert folds(tracks).tolist() == expected
+
+
+def test_what_was_peculiar_to_a_long_trial_is_no_drift_of_the_session():
+    """Three trials of 60 s, each with another gain, cut into pieces: a curve along the session must not follow the three."""
+    parts = []
+    for number, gain in enumerate((1.0, 1.02, 0.99)):
+        one = measured(hidden(speed_gain={"gain": gain}), trials=1, commands=60, seed=number)
+        parts.append(one.assign(trial=number))
+    table = split(pd.concat(parts, ignore_index=True), "lasting_s", 6.0)
+    predictor = WheelPredictor(tracks_of(checked(table)[0]))
+    of = folds(predictor.tracks)
+    assert len(set(of)) == 3
+    assert all(np.ptp(of[[name.startswith(f"{k}-") for name in predictor.tracks.names]]) == 0 for k in range(3))
+    steps = held_out_steps(predictor, problem_for(predictor, MODEL).pose_filter, NOMINAL.with_effect("speed-gain", gain=1.0))
+    told = predictor.steps(NOMINAL).body[:, 0]
+    clear = (told > 1e-4) & (of[predictor.tracks.trial] == 1)
+    assert np.median(steps.body[clear, 0] / told[clear]) < 1.005  # by a fit to the others, whose gains are 1.0 and 0.99
