@@ -72,7 +72,7 @@ def notes_on(
             f"{' with '.join(found.withdrawn)} would raise the likelihood, but not improve predictions of held-out trials "
             "(root mean square and median on the same windows). So it is not presented as an explanation."
         )
-    yield from _on_slight(found.unseen, slight)
+    yield from _on_slight(found.unseen, [*slight, *(one.in_words for one in found.slight_along[:1])])
     known = known_effects(selection) if found.negligible else {}
     for name, numbers in found.negligible.items():
         why = ""

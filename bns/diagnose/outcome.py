@@ -17,16 +17,17 @@ from bns.diagnose.beside_terms import (
     unexplained_beside,
     without_absurd,
 )
-from bns.diagnose.estimate.cross_validation import held_out_steps
+from bns.diagnose.estimate.cross_validation import Judged, held_out_steps, judged_errors
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.paired_errors import PairedErrors, paired_errors
-from bns.diagnose.residuals.along_variables import ResidualDependence
+from bns.diagnose.residuals.along_variables import ResidualDependence, with_curve
 from bns.diagnose.residuals.symbolic import Formula, best_formula
 from bns.diagnose.residuals.unexplained import NOTHING, Unexplained, without_moments_explained
 from bns.diagnose.select.negligible import LEAST_FALL, Shift, fall_matters, negligible_and_errors, seen_in_heading
 from bns.diagnose.select.result import SelectionResult
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.standing import (
+    Standing,
     beside_the_floor,
     errors_before_and_after,
     explained_by,
@@ -65,6 +66,9 @@ class Outcome:
     """The first term; without terms, a formula fitted to the variable along which most is left, where it earns something."""
     seen_in_heading: dict[str, tuple[str, float, float]] = field(default_factory=dict)
     """Effects that lower no error of position: at which horizon that of the heading most, without and with them (rad)."""
+
+    slight_along: tuple[ResidualDependence, ...] = ()
+    """Patterns that are certain and do not count: free curves along them lower no error that matters."""
 
     @property
     def fewer(self) -> bool:
@@ -126,7 +130,8 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
             stands, imitating, terms, with_terms = next_to, lost, found.terms, errors
             if errors is not None and errors.falls_in_the_end:  # what a term describes is no accident
                 stands = replace(stands, rest=without_moments_explained(stands.rest, found.problem, found.fit))
-    if unseen or slight:
+    along = () if unseen or slight or terms else _slight_along(stands)
+    if unseen or slight or along:
         stands = replace(stands, rest=NOTHING)
     whole = stands.selection
     tiny, kept_for, in_heading = ((), {}, {}) if terms else _negligible(whole)
@@ -151,7 +156,28 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
         with_terms,
         formula,
         in_heading,
+        along,
     )
+
+
+def _slight_along(stands: Standing) -> tuple[ResidualDependence, ...]:
+    """All that is left of a body, where it is patterns alone and free curves along the best lower no error that matters.
+
+    Of wheels the terms tell; few terms are of a body's variables. Contacts that are a little otherwise than in the model leave
+    something certain in every long log of it.
+    """
+    rest, problem, fit = stands.rest, stands.selection.problem, stands.selection.fit
+    others = rest.outliers or rest.autocorrelation or rest.command_times
+    if problem.predictor.luck is None or not rest.residual_dependence or others:
+        return ()
+    lacking = Judged("lacking", fit.model, problem.pose_filter)
+    for pattern in rest.residual_dependence[:3]:
+        found = problem.fit(with_curve(fit.model, problem.predictor, pattern))
+        having = Judged("having", found.model, problem.pose_filter)
+        errors = judged_errors(problem.predictor, problem.pose_filter, fit.model, (lacking, having))
+        if fall_matters(errors, lacking.name, having.name):
+            return ()
+    return rest.residual_dependence
 
 
 def _negligible(

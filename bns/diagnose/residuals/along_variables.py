@@ -8,7 +8,7 @@ fitted to. No physics is assumed, so whatever moves the robot by a rule that can
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,8 +21,10 @@ from bns.diagnose.estimate.normal_equations import NormalEquations, innovations_
 from bns.diagnose.estimate.parameters import active_mask
 from bns.diagnose.estimate.significance import MIN_Z, PairedComparison, chance, paired_elpd_diff
 from bns.diagnose.parallel import each
+from bns.diagnose.predict.base import Predictor
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect, Parameter
+from bns.physics.model import Model
 from bns.physics.order import FORMULAS
 from bns.physics.signals import Body
 
@@ -128,6 +130,16 @@ def probe_effect(channel: str, curve: Array, heading_rad: Array | None) -> Effec
         apply=apply,
         after=FORMULAS,
     )
+
+
+def with_curve(model: Model, predictor: Predictor, pattern: ResidualDependence) -> Model:
+    """The model with the free curve of a pattern, a number for each of its knots (places: bumps), all 0."""
+    variables = predictor.variables()
+    basis = next(of for name, of in curves(variables) if name == pattern.variable)
+    for k, curve in enumerate(basis):
+        one = probe_effect(pattern.channel, curve, variables.get("heading_rad"))
+        model = model.with_active(replace(one, name=f"{one.name}-{k}"), (0.0,))
+    return model
 
 
 def _columns(problem: Problem, fit: Fit, channel: str, basis: list[Array], headings: Array | None) -> Array:
