@@ -15,7 +15,7 @@ from bns.diagnose.estimate.calibration import calibrated
 from bns.diagnose.estimate.plausibility import fitted_again
 from bns.diagnose.estimate.significance import fewest_trials
 from bns.diagnose.estimate.starts import listed
-from bns.diagnose.outcome import alike_in_metres, outcome_of, predicts_better_throughout
+from bns.diagnose.outcome import Outcome, alike_in_metres, outcome_of, predicts_better_throughout
 from bns.diagnose.parallel import one_thread_each
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.wheels import WheelPredictor
@@ -105,12 +105,8 @@ def _diagnosed(
     pairs = [] if left else _longer(found.selection, listed(found.selection.nominal.model, extra, predictor.tracks, barred))
     notes = [*notes_on(found, predictor.tracks, hint, pairs, said.sentences, slight, formula)]
     verdict = _verdict(found.selection, left, hint)
-    if verdict != "insufficient-data" and isinstance(predictor, WheelPredictor):
-        noise, with_terms = found.selection.problem.pose_filter.noise, found.errors_with_terms
-        if verdict != "unlisted":
-            notes += scatter_in_words(predictor, noise, found.errors)
-        elif with_terms is not None and with_terms.falls_in_the_end:
-            notes += still_left_in_words(predictor, noise, with_terms)
+    if isinstance(predictor, WheelPredictor):
+        notes += _on_what_remains(found, predictor, verdict)
     presented = presented_fit(found.selection, found.terms, found.errors_with_terms)
     contradicted = fitted_again(model, presented, contradicted=True) if found.terms or found.selection.accepted else ()
     return Diagnosis(
@@ -130,6 +126,14 @@ def _diagnosed(
         notes=(*notes, *(f"{said} The interval does not contain the number that was given." for said in contradicted)),
         calibration=calibrated(predictor, model, barred),
     )
+
+
+def _on_what_remains(found: Outcome, predictor: WheelPredictor, verdict: str) -> list[str]:
+    """Where the error is far above noise after all: the drive's scatter, or what terms leave of what no effect explains."""
+    say, errors = (still_left_in_words, found.errors_with_terms) if verdict == "unlisted" else (scatter_in_words, found.errors)
+    if verdict == "insufficient-data" or errors is None or (verdict == "unlisted" and not errors.falls_in_the_end):
+        return []
+    return say(predictor, found.selection.problem.pose_filter.noise, errors)
 
 
 def _from_better_numbers(selection: SelectionResult, before: SelectionResult | None) -> SelectionResult:

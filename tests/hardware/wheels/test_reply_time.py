@@ -196,7 +196,10 @@ def test_a_rigs_settings_reach_link_and_driver(tmp_path, monkeypatch):
     with Stopping() as stopping, open_rig(TrialSetup(rig, yes=True), 0, None, stopping) as opened:
         link = opened.platform._platform._driver._link
         assert link.times.limits == ReplyLimits(0.5, 0.21, 0.7)
-        assert link.times.timeout_s == 0.21
+        assert link.times.timeout_s >= 0.21  # longer where this machine answers late
+        quick = ReplyTime(link.times.limits)
+        quick.measured(0.02)
+        assert quick.timeout_s == 0.21
         opened.platform._platform._driver._link.times.measured(0.02)
         robot.body.order(0.1, 0.1, robot.clock.now_s())
         robot.body.order = lambda *_: None  # takes the order, does not carry it out
