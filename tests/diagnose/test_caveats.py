@@ -339,7 +339,7 @@ def test_so_many_more_trials_as_would_make_a_sign_certain_are_asked_for(z, more)
         fit=SimpleNamespace(model=NOMINAL, free=()), nominal=SimpleNamespace(losses=np.ones(10)),
     )  # fmt: skip
     nothing = dict.fromkeys(("imitating", "withdrawn", "unseen", "negligible", "formula", "errors_with_terms"))
-    nothing["beside_negligible"] = nothing["kept_for"] = nothing["seen_in_heading"] = {}
+    nothing |= {"beside_negligible": {}, "kept_for": {}, "seen_in_heading": {}, "slight_along": ()}
     found = SimpleNamespace(**nothing | {"selection": selection, "negligible": {}, "imitating": (), "rest": NOTHING, "terms": ()})
     hint = SimpleNamespace(name="turn-slip", paired_comparison=SimpleNamespace(z=z))
     (note,) = notes_on(found, tracks_of(measured(NOMINAL, trials=10)), hint)
@@ -351,7 +351,7 @@ def test_notes_on_effects_know_whether_something_is_left(monkeypatch, terms, all
     told = []
     monkeypatch.setattr("bns.diagnose.caveats.on_effects", lambda *given: [told.append(given[3])])
     nothing = dict.fromkeys(("imitating", "withdrawn", "unseen", "negligible", "formula", "errors_with_terms"))
-    nothing["beside_negligible"] = nothing["kept_for"] = nothing["seen_in_heading"] = {}
+    nothing |= {"beside_negligible": {}, "kept_for": {}, "seen_in_heading": {}, "slight_along": ()}
     selection = SimpleNamespace(implausible={}, accepted=())
     found = SimpleNamespace(**nothing | {"selection": selection, "rest": NOTHING, "terms": terms, "negligible": {}})
     monkeypatch.setattr("bns.diagnose.caveats.on_moved", lambda _: [])
@@ -379,7 +379,7 @@ def test_a_number_without_a_unit_is_written_without_one(monkeypatch, name, cause
     )  # fmt: skip
     numbers = {"x_m_s": {"value": 0.0026, "unit": "m/s"}, "behind_share": {"value": 0.00124, "unit": "1"}}
     nothing = {**dict.fromkeys(("withdrawn", "unseen", "formula", "errors_with_terms")), "beside_negligible": {}, "kept_for": {}}
-    nothing["seen_in_heading"] = {}
+    nothing |= {"seen_in_heading": {}, "slight_along": ()}
     found = SimpleNamespace(
         **nothing, selection=selection, negligible={name: numbers}, imitating=(), rest=NOTHING, terms=()
     )

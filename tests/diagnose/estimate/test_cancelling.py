@@ -121,7 +121,7 @@ def test_it_is_among_the_notes_where_the_term_is_in_the_extended_model(monkeypat
     nothing = dict.fromkeys(("withdrawn", "unseen", "formula"))
     found = SimpleNamespace(
         **nothing, selection=selection, negligible={}, beside_negligible={}, kept_for={}, seen_in_heading={}, rest=NOTHING,
-        imitating=("battery-sag",),
+        imitating=("battery-sag",), slight_along=(),
         terms=(SimpleNamespace(fit=fit_of((*SAG, beside, 0.9 * beside, 1.1 * beside)), signal=signal),),
         errors_with_terms=SimpleNamespace(rose_in_the_end=rose, falls_in_the_end=not rose),
     )  # fmt: skip
