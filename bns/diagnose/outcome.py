@@ -161,14 +161,17 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
 
 
 def _slight_along(stands: Standing) -> tuple[ResidualDependence, ...]:
-    """All that is left of a body, where it is patterns alone and free curves along the best lower no error that matters.
+    """All that is left of a body, where it is small patterns alone and free curves along the best lower no error that matters.
 
     Of wheels the terms tell; few terms are of a body's variables. Contacts that are a little otherwise than in the model leave
-    something certain in every long log of it.
+    something certain in every long log of it. Small: curves remove less than `least_fall` of the loss. What is larger counts in
+    any case, since a curve of velocities may lower no error of something else, such as a spring in a joint.
     """
     rest, problem, fit = stands.rest, stands.selection.problem, stands.selection.fit
     others = rest.outliers or rest.autocorrelation or rest.command_times
     if problem.predictor.luck is None or not rest.residual_dependence or others:
+        return ()
+    if any(pattern.share >= LEAST_FALL for pattern in rest.residual_dependence):
         return ()
     lacking = Judged("lacking", fit.model, problem.pose_filter)
     for pattern in rest.residual_dependence[:3]:

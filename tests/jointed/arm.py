@@ -50,12 +50,14 @@ def log(
     speed_rad_s: float = np.inf,
     told_rad_s: float = np.inf,
     seen_every: int = 10,
+    spring_n_m_rad: float = 0.0,
 ) -> pd.DataFrame:
     """Random set points every 0.48 s, seen at 25 Hz; the elbow's zero may be off, its servo weak or of a lower gain.
 
     ``seen_every``: steps of 4 ms from one frame to the next. ``friction_n_m``: dry friction in each joint. ``carried_kg``: at the
     hand. ``finer``: with steps so many times shorter than the model's, and another integrator. ``speed_rad_s``: of the servos,
-    which go from set point to set point no faster; ``told_rad_s``: of the set points themselves.
+    which go from set point to set point no faster; ``told_rad_s``: of the set points themselves. ``spring_n_m_rad``: of a hose
+    that pulls the shoulder back.
     """
     rng, rows = np.random.default_rng(seed), []
     model = mujoco.MjModel.from_xml_string(loaded(xml(), "hand", carried_kg) if carried_kg else xml())
@@ -63,6 +65,7 @@ def log(
     model.actuator_biasprm[1, 1] *= strength * gain
     model.actuator_forcerange[1] *= strength
     model.dof_frictionloss[:] = friction_n_m
+    model.jnt_stiffness[0] = spring_n_m_rad
     if finer > 1:
         model.opt.timestep, model.opt.integrator = 0.004 / finer, mujoco.mjtIntegrator.mjINT_EULER
     for trial in range(trials):

@@ -1,5 +1,6 @@
 """What is left of a body along a variable counts where it would lower the error: a long log makes next to nothing certain."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,12 +10,14 @@ from bns.api.common.prepared import prepared
 from bns.api.model import Model
 from bns.diagnose import outcome
 from bns.diagnose.caveats import _on_slight
+from bns.diagnose.estimate.problem import settled_problem
 from bns.diagnose.estimate.significance import PairedComparison
-from bns.diagnose.residuals.along_variables import SHARE, ResidualDependence, with_curve
+from bns.diagnose.residuals.along_variables import SHARE, ResidualDependence, residual_dependence, with_curve
 from bns.diagnose.residuals.unexplained import Unexplained
 from tests.jointed.arm import log, xml
 
 PATTERNS = tuple(ResidualDependence(f"joint-{k}", SHARE, PairedComparison(1.0, 0.1, 5e-5), 0.002) for k in range(5))
+NEARLY = (replace(PATTERNS[0], share=0.019),)
 
 
 def standing(luck, rest):
@@ -37,6 +40,8 @@ def standing(luck, rest):
         ("luck", Unexplained(PATTERNS, None, ("a moment",)), (), (), []),
         ("luck", Unexplained((), None, ()), (), (), []),
         (None, Unexplained(PATTERNS, None, ()), (), (), []),  # of wheels, terms tell
+        ("luck", Unexplained((*PATTERNS, replace(PATTERNS[0], share=0.021)), None, ()), (), (), []),  # large
+        ("luck", Unexplained(NEARLY, None, ()), (), NEARLY, ["joint-0"]),
     ],
 )
 def test_patterns_whose_curves_lower_no_error_are_slight(luck, rest, matters, slight, asked, monkeypatch):
@@ -60,6 +65,17 @@ def test_the_free_curve_of_a_pattern_is_what_moves_a_body(tmp_path):
     np.testing.assert_allclose(same, plain, atol=1e-12)
     moved = curved.with_values({one.effect.name: {"size": 0.03} for one in knots})
     np.testing.assert_allclose(predictor.steps(moved).body, 1.03 * plain, rtol=3e-4)
+
+
+@pytest.mark.parametrize(("spring_n_m_rad", "counts"), [(1.5, True), (0.0, False)])
+def test_a_hose_that_pulls_counts_and_the_same_patterns_of_an_arm_without_one_are_slight(tmp_path, spring_n_m_rad, counts):
+    """MuJoCo has the spring, and no listed effect is one."""
+    (tmp_path / "arm.xml").write_text(xml())
+    predictor = prepared(log(10, seed=3, spring_n_m_rad=spring_n_m_rad), Model(tmp_path / "arm.xml")).predictor
+    problem, fit = settled_problem(predictor, predictor._bare)
+    patterns = tuple(residual_dependence(problem, fit))
+    stands = SimpleNamespace(selection=SimpleNamespace(problem=problem, fit=fit), rest=Unexplained(patterns, None, ()))
+    assert outcome._slight_along(stands) == (() if counts else patterns)
 
 
 def test_it_is_said():
