@@ -167,6 +167,9 @@ def test_set_points_at_times_hold_until_the_next():
     assert drive.frames.tolist() == [10, 15, 20, 25]
     assert drive.set_points[[0, 9, 10, 19, 20], 0].tolist() == [0, 0, 1, 1, 2]
     assert told_speed_rad_s([drive], 0.1) == pytest.approx(2.0)  # a jump of 1 rad, over half a second
+    began = at_times(t, told, (1.0, 2.5), 0.1, np.zeros(3), began=np.array([-5.0]))
+    assert began.set_points[:2, 0].tolist() == [-5, 0]
+    assert told_speed_rad_s([began], 0.1) == pytest.approx(2.0)  # of what it was told: nobody told it to begin there
 
 
 def test_a_model_file_names_body_and_effects(tmp_path):

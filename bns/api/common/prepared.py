@@ -11,12 +11,13 @@ from bns.api.model import Given, Model, as_model
 from bns.diagnose.adding import known_to
 from bns.diagnose.data.bodies.cycles import CycleTracks, marker_noise_m
 from bns.diagnose.data.bodies.joints import SET, JointTracks, check_names, check_scales
-from bns.diagnose.data.bodies.stretches import stretches_of_cycles, stretches_of_joints
+from bns.diagnose.data.bodies.stretches import stretches_of_cycles
 from bns.diagnose.data.load import Measured, naming
 from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.check_robot import check_named_robot, check_same_robot
 from bns.diagnose.predict.jointed import JointedPredictor
+from bns.diagnose.predict.run_ups import joint_stretches
 from bns.diagnose.predict.saved_networks import network_predictor, networks_file
 from bns.diagnose.predict.wheels import predictor_for_search
 from bns.errors import DataError, ModelError, in_both
@@ -136,7 +137,7 @@ def _prepared_body(read: Measurements, model: Model) -> Prepared:
         check_names(tracks, body.joints, model.mechanism.sites)
         with naming(measured.path):
             check_scales(tracks, body.joints, body.told, None if body.free else float(body.model.stat.extent))
-        predictor = JointedPredictor(stretches_of_joints(tracks, model.mechanism, body.joints), model, "stretch")
+        predictor = JointedPredictor(joint_stretches(tracks, model.mechanism), model, "stretch")
     return Prepared(read, replace(measured, tracks=predictor.tracks), predictor, model)
 
 

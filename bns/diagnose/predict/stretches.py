@@ -106,9 +106,9 @@ class _Body:
 
     def __init__(self, tracks: StretchTracks, mechanism: Mechanism) -> None:
         fine_s = float(machine(mechanism).model.opt.timestep)
-        looks = _looks(tracks, fine_s)
+        looks_s = _looks(tracks, _COARSER * fine_s)
         simulators = [
-            Simulator(machine(mechanism, dt_s), _drives(tracks, dt_s, looks), cores())
+            Simulator(machine(mechanism, dt_s), _drives(tracks, dt_s, looks_s), cores())
             for dt_s in (fine_s, _COARSER * fine_s)
         ]
         first = np.concatenate([[0], np.cumsum(simulators[0].counts)]).astype(np.int64)
@@ -119,8 +119,9 @@ class _Body:
 class Simulations:
     """Chosen stretches and their simulations.
 
-    A body is looked at in a stretch's first and last frame, and in between so often that a cubic does for other times. Chords
-    would make its ways shorter: with looks 0.04 s apart, by half a percent of a quick arm's.
+    A body is looked at in a stretch's first and last frame, and where it was seen in between: in the two steps beside each frame,
+    and else so often that a cubic does for other times, as a clock that is off has them. Chords would make its ways shorter: with
+    looks 0.04 s apart, by half a percent of a quick arm's.
     """
 
     def __init__(self, body: _Body, tracks: StretchTracks, chosen: NDArray[np.int64]) -> None:
@@ -211,19 +212,36 @@ def _comes_near(place: Rough, box_m: Array) -> NDArray[np.bool_]:
     return np.asarray(((box_m[:, :2] < high) & (box_m[:, 2:] > low)).all(axis=1))
 
 
-def _looks(tracks: StretchTracks, dt_s: float) -> NDArray[np.int64]:
-    """How often each stretch is looked at: at its ends; more often where it was seen in between."""
-    between = np.bincount(tracks.stretch) > 2
-    out = np.full(len(tracks.told), 2)
-    for i in np.flatnonzero(between):
-        ends = tracks.told[i].drive(dt_s, tracks.pose[tracks.begins[i]], 2).frames
-        out[i] = max(int(np.ceil((ends[-1] - ends[0]) * dt_s / _LOOK_S)), 1) + 1
+def _looks(tracks: StretchTracks, step_s: float) -> list[Array]:
+    """When each stretch is looked at, since its begin: at its ends; if it was seen in between, evenly and beside each frame."""
+    bounds = np.searchsorted(tracks.stretch, np.arange(len(tracks.told) + 1))
+    out = []
+    for told, begin, i, k in zip(tracks.told, tracks.begins, bounds[:-1], bounds[1:], strict=True):
+        ends = told.drive(step_s, tracks.pose[begin], 2).frames
+        last = int(ends[-1] - ends[0])
+        steps = np.array([0, last])
+        if k - i > 2:
+            evenly = np.linspace(0, last, max(int(np.ceil(last * step_s / _LOOK_S)), 1) + 1).round()
+            since_s = tracks.since_s[i:k]
+            before = np.floor(since_s[np.isfinite(since_s)] / step_s)
+            steps = np.unique(np.clip(np.concatenate([evenly, before, before + 1]), 0, last))
+        out.append(steps * step_s)
     return out
 
 
-def _drives(tracks: StretchTracks, dt_s: float, looks: NDArray[np.int64]) -> list[Drive]:
-    begins = tracks.pose[tracks.begins]
-    return [told.drive(dt_s, begin, int(n)) for told, begin, n in zip(tracks.told, begins, looks, strict=True)]
+def _drives(tracks: StretchTracks, dt_s: float, looks_s: list[Array]) -> list[Drive]:
+    return [
+        _looked_at(told.drive(dt_s, tracks.pose[begin], 2), look_s, dt_s)
+        for told, begin, look_s in zip(tracks.told, tracks.begins, looks_s, strict=True)
+    ]
+
+
+def _looked_at(drive: Drive, look_s: Array, dt_s: float) -> Drive:
+    """The same, looked at in the steps next to these times since its begin (looks,), and in its last."""
+    first, last = int(drive.frames[0]), int(drive.frames[-1])
+    frames = np.minimum(first + np.round(look_s / dt_s).astype(np.int64), last)
+    frames[-1] = last
+    return replace(drive, frames=frames)
 
 
 def _stacked(s: Sighting) -> Array:

@@ -104,9 +104,33 @@ class Predict:
     look_s: float = setting(
         0.02,
         "s",
-        "Time between the recorded states of a simulated body; camera frames in between lie on a cubic through four of them. On "
-        "straight lines through states 0.04 s apart, an arm's own simulation, seen at 30 Hz, moved 0.4 % too far; on cubics "
-        "through these, by less than 0.07 % of the loss under a noise of 0.05 mm.",
+        "Longest time between the recorded states of a simulated body, which is also recorded in the two steps beside each "
+        "camera frame; frames lie on a cubic through four states. On straight lines through states 0.04 s apart, an arm's own "
+        "simulation, seen at 30 Hz, moved 0.4 % too far; on cubics through states this far apart, by less than 0.07 % of the "
+        "loss under a noise of 0.05 mm.",
+    )
+    run_up_longest_s: float = setting(
+        8.0,
+        "s",
+        "What a body's servos were told before a stretch is simulated over at most this time. Beginning from 2 s, the time is "
+        "doubled as long as that halves what shows of the posture in which it begins.",
+    )
+    run_up_shows_m: float = setting(
+        1e-4,
+        "m",
+        "A run-up is long enough if one of twice its length ends no further than this from it (root mean square over stretches). "
+        "Of an arm with servos of 6 N m/rad, a run-up of 2 s ended 45 mm away in one stretch of 24 and up to 5 mm in others.",
+    )
+    run_up_stretches: int = setting(
+        24,
+        "stretches",
+        f"With at most this many evenly spaced stretches it is found how long a run-up is needed; {BY_HAND}.",
+    )
+    began_near: float = setting(
+        0.1,
+        "1",
+        "A trial of a body is taken to begin at rest if its first pose is nearer to the model's own posture, or to that of its "
+        f"first set points, than this share of what poses usually differ by; {BY_HAND}.",
     )
     wild_m: float = setting(
         0.03,

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from bns.physics.jointed.mechanism import Mechanism
 from bns.physics.jointed.plant import Array
 
+RUN_UP_S = 2.0
+"""Set points of at least this long before a stretch bring the joints to where they are when it begins."""
+
 
 @dataclass(frozen=True)
 class Drive:
@@ -46,19 +49,29 @@ def through_postures(
 
 
 def at_times(
-    t_s: Array, set_points: Array, seen_s: tuple[float, float], dt_s: float, begin: Array, looks: int = 2
+    t_s: Array,
+    set_points: Array,
+    seen_s: tuple[float, float],
+    dt_s: float,
+    begin: Array,
+    looks: int = 2,
+    run_up_s: float = RUN_UP_S,
+    began: Array | None = None,
 ) -> Drive:
-    """Set points (n, joints), each from its time t_s (n,) on, until the robot is seen for the last time."""
+    """Set points (n, joints), each from its time t_s (n,) on, until the robot is seen for the last time.
+
+    Those of the ``run_up_s`` before it is first seen bring the joints to where they are then. At the first of them the robot is
+    at rest; where that is the first of all, in the posture ``began`` (joints,), if it is known.
+    """
     from_s, to_s = seen_s
-    start = max(from_s - RUN_UP_S, float(t_s[0]))
+    start = max(from_s - run_up_s, float(t_s[0]))
     before = max(round((from_s - start) / dt_s), 1)
     steps = before + max(round((to_s - from_s) / dt_s), 1)
     at = np.searchsorted(t_s, start + np.arange(steps) * dt_s + 1e-9, side="right") - 1
-    return Drive(set_points[np.maximum(at, 0)], _looks(before, steps, looks), begin)
-
-
-RUN_UP_S = 2.0
-"""Set points of this long before a stretch bring the joints to where they are when it begins."""
+    told = set_points[np.maximum(at, 0)]
+    if began is not None and start == t_s[0]:
+        told = np.concatenate([began[None], told[1:]])
+    return Drive(told, _looks(before, steps, looks), begin)
 
 
 def _looks(first: int, last: int, looks: int) -> NDArray[np.int64]:
@@ -68,10 +81,12 @@ def _looks(first: int, last: int, looks: int) -> NDArray[np.int64]:
 def told_speed_rad_s(drives: Sequence[Drive], dt_s: float) -> float:
     """The fastest that set points move over half a second, but for the quickest hundredth.
 
-    Set points may jump: over a shorter time, a jump is as fast as the time is short.
+    Set points may jump: over a shorter time, a jump is as fast as the time is short. The first of all is where a robot is, which
+    nobody need have told it.
     """
     k = max(round(_OVER_S / dt_s), 1)
-    ways = [np.abs(d.set_points[k:] - d.set_points[:-k]).max(axis=1) for d in drives if len(d.set_points) > k]
+    told = [d.set_points[1:] for d in drives if len(d.set_points) > k + 1]
+    ways = [np.abs(each[k:] - each[:-k]).max(axis=1) for each in told]
     return float(np.quantile(np.concatenate(ways), 0.99)) / (k * dt_s) if ways else 0.0
 
 

@@ -56,13 +56,18 @@ class Postures:
 
 @dataclass(frozen=True)
 class SetPoints:
-    """Set points (n, joints) from times t_s (n,) on; seen from ``from_s`` to ``to_s``."""
+    """Set points (n, joints) from times t_s (n,) on; seen from ``from_s`` to ``to_s``.
+
+    ``run_up_s`` and ``began`` (joints,): how long before it is simulated, and from which posture a trial began, as of `at_times`.
+    """
 
     t_s: Array
     set_points: Array
     from_s: float
     to_s: float
     joints: tuple[str, ...]
+    run_up_s: float = RUN_UP_S
+    began: Array | None = None
 
     @property
     def at_begin(self) -> Array:
@@ -72,11 +77,11 @@ class SetPoints:
 
     def drive(self, dt_s: float, begin: Array, looks: int) -> Drive:
         """As of `Told`."""
-        return at_times(self.t_s, self.set_points, (self.from_s, self.to_s), dt_s, begin, looks)
+        return at_times(self.t_s, self.set_points, (self.from_s, self.to_s), dt_s, begin, looks, self.run_up_s, self.began)
 
     def commands(self) -> dict[str, Array]:
         """Rows from what is in force when the joints are brought to where they are, to the last one."""
-        start = max(self.from_s - RUN_UP_S, float(self.t_s[0]))
+        start = max(self.from_s - self.run_up_s, float(self.t_s[0]))
         first = int(np.searchsorted(self.t_s, start, side="right")) - 1
         rows = slice(max(first, 0), int(np.searchsorted(self.t_s, self.to_s, side="left")))
         told = {f"{name}{SET}": self.set_points[rows, k] for k, name in enumerate(self.joints)}
@@ -168,8 +173,16 @@ def stretches_of_cycles(tracks: CycleTracks, mechanism: Mechanism, joints: int) 
     return _joined(tracks, tracks.trial[2 * chosen], points, since, number, times, told, about)
 
 
-def stretches_of_joints(tracks: JointTracks, mechanism: Mechanism, joints: Sequence[str]) -> StretchTracks:
-    """Trials cut into stretches of some seconds; what was told shortly before one brings the joints to where they are.
+def stretches_of_joints(
+    tracks: JointTracks,
+    mechanism: Mechanism,
+    joints: Sequence[str],
+    run_up_s: float = RUN_UP_S,
+    began: Sequence[Array | None] | None = None,
+) -> StretchTracks:
+    """Trials cut into stretches of some seconds; what was told ``run_up_s`` before one brings the joints to where they are.
+
+    ``began`` (trials): the posture in which each began, None where that is its first set points.
 
     The direction from the first site to the last is the heading: no stretch begins where they are near to one another, as those
     of an arm may be that is seen from above, and poses where they nearly coincide are left out.
@@ -196,7 +209,8 @@ def stretches_of_joints(tracks: JointTracks, mechanism: Mechanism, joints: Seque
             since.append(tracks.t_s[inside] - from_s)
             times.append(tracks.t_s[inside])
             number.append(np.full(len(inside), len(told)))
-            told.append(SetPoints(rows[0], rows[1][:, columns], from_s, to_s, tuple(joints)))
+            start = began[trial] if began else None
+            told.append(SetPoints(rows[0], rows[1][:, columns], from_s, to_s, tuple(joints), run_up_s, start))
             of.append(trial)
     if not told:
         raise DataError(f"No trial lasts {RUN_UP_S + _LASTS_S:g} s, for a stretch and the time before it; give longer trials.")
