@@ -86,8 +86,8 @@ def write_measurements(table: pd.DataFrame, path: str | Path, columns: Sequence[
             table.to_parquet(unfinished, index=False)
         unfinished.replace(path)
     except BaseException as error:  # a part of a table would take the space that is missing
-        if isinstance(error, OSError) and error.filename is not None:
-            error.filename = str(path)  # the name that was given, not that of the unfinished file
         with suppress(OSError):
             unfinished.unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.errno is not None:  # with the name that was given, not the unfinished file's
+            raise OSError(error.errno, os.strerror(error.errno), str(path)) from error
         raise

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from bns.errors import BnsError
@@ -19,17 +21,32 @@ def copy_example(folder: str | Path) -> list[Path]:
     """Copy the files to begin with into ``folder``, which is made if it is missing; return their new paths.
 
     Raises:
-        BnsError: ``folder`` is a file, or not empty; nothing is overwritten.
+        BnsError: ``folder`` is a file, or not empty, or cannot be written; nothing is overwritten, nothing left half.
     """
-    folder = _emptied(folder)
-    return [Path(shutil.copy(FOLDER / name, folder / name)) for name in FILES]
+    with _whole(folder) as new:
+        return [Path(shutil.copy(FOLDER / name, new / name)) for name in FILES]
 
 
 def copy_robot(folder: str | Path) -> list[Path]:
     """Copy the package of a robot of one's own likewise: README first, then all other files."""
-    folder = _emptied(folder)
-    shutil.copytree(ROBOT, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
-    return sorted((file for file in folder.rglob("*") if file.is_file()), key=lambda file: (file.name != "README.md", str(file)))
+    with _whole(folder) as new:
+        for file in sorted(ROBOT.rglob("*")):
+            if file.is_file() and "__pycache__" not in file.parts:
+                (new / file.relative_to(ROBOT)).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy(file, new / file.relative_to(ROBOT))
+    return sorted((file for file in new.rglob("*") if file.is_file()), key=lambda file: (file.name != "README.md", str(file)))
+
+
+@contextmanager
+def _whole(folder: str | Path) -> Iterator[Path]:
+    """The folder, made if it is missing. If it cannot be filled it is left empty, and BnsError names it."""
+    new = _emptied(folder)
+    try:
+        yield new
+    except OSError as error:
+        for file in new.iterdir():
+            shutil.rmtree(file) if file.is_dir() else file.unlink()
+        raise BnsError(f"cannot write into {new}: {error.strerror}. Make room there, or name another folder.") from error
 
 
 def _emptied(folder: str | Path) -> Path:

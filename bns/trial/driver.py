@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from bns.errors import TrialPausedError
+from bns.errors import BnsError, TrialPausedError
 from bns.hardware.clock import Clock
 from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.platform import Driven, Platform
@@ -180,6 +180,11 @@ class TrialDriver:
         self.underway.begins(len(controller), self._lasts_s(controller), self.readings)
         try:
             driven = self._platform.drive(controller)
+        except BaseException as why:
+            with suppress(OSError, BnsError):  # a journal that cannot be written is told of by the drive itself
+                self._note(purpose, "interrupted", why=str(why) or type(why).__name__)
+                self._log.sync()
+            raise
         finally:
             self.underway.ends()
         self.stops_s.append(driven.stop.seconds)
@@ -262,4 +267,4 @@ class TrialDriver:
         off_rad = abs(math.remainder(pose[2] - self.start[2], 2.0 * math.pi))
         if off_rad > self._rig.placed_within_rad:
             return f"The robot is turned by {math.degrees(off_rad):.0f}° from its start"
-        return "The drive gave no result" if void else None
+        return f"The drive gave no result{f': {self._last_end}' if self._last_end else ''}" if void else None

@@ -128,7 +128,8 @@ class UnattendedOperator:
 
     def place(self, start: np.ndarray, why: str) -> None:
         """Pause."""
-        raise TrialPausedError(f"{why}, and with --yes there is no operator to put it back. Do so, then resume with --resume")
+        also = " With" if why.endswith("?") else ", and with"
+        raise TrialPausedError(f"{why}{also} --yes there is no operator to put it back. Do so, then resume with --resume")
 
     def accept(self, summary: str, spans_s: Spans) -> Decision:
         """Keep everything."""

@@ -102,6 +102,8 @@ def open_rig(how: TrialSetup, seed: int, journal: Path | None, stopping: Stoppin
         clock: Clock = EmulatedClock(how.speed)
         if not how.emulated:
             guard = _guard(rig, module, journal, stack)
+            if guard is not None:
+                stack.enter_context(_named(guard.path, rig.port))
             clock = RealClock() if guard is None else GuardedClock(guard)
         log = stack.enter_context(HardwareLog(journal, clock))
         stopping.causes.append(log.check)
@@ -137,6 +139,16 @@ def _guard(rig: Rig, module: PlatformModule, journal: Path | None, stack: ExitSt
     guard = Guard(rig.port, recipe_of(rig), rig.limits.silent_s, log, rig.limits.gives_up_s)
     stack.callback(_let_go, guard)
     return guard
+
+
+@contextmanager
+def _named(path: str, port: str) -> Iterator[None]:
+    """Errors that name the guard's way to the robot name the port that was given."""
+    try:
+        yield
+    except BnsError as error:
+        error.args = tuple(a.replace(path, port) if isinstance(a, str) else a for a in error.args)
+        raise
 
 
 def _let_go(guard: Guard) -> None:

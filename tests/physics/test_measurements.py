@@ -1,9 +1,12 @@
 """The table that robots and simulations share."""
 
+import errno
+
 import numpy as np
 import pandas as pd
 import pytest
 
+from bns.cli.main import main
 from bns.errors import ModelError
 from bns.measurements import COLUMNS, trial_table, write_measurements
 
@@ -43,3 +46,22 @@ def test_what_does_not_fit_is_refused(tmp_path):
     with pytest.raises(ModelError, match=r"end in \.csv or \.parquet"):
         write_measurements(table, tmp_path / "m.xlsx")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_a_place_that_cannot_be_written_is_named_and_no_part_of_a_table_stays(tmp_path, monkeypatch, suffix, capsys):
+    """Arrow's errors name no file of their own and say `Failed to open local file ... Detail: ...` for its reason."""
+    table, path = trial_table(1, COMMANDS, POSES), tmp_path / f"m.{suffix}"
+    table.to_csv(tmp_path / "log.csv", index=False)
+
+    def refused(_table, unfinished, **_):
+        unfinished.write_bytes(b"part")
+        raise OSError(errno.EROFS, f"Failed to open local file '{unfinished}'. Detail: [errno 30] Read-only file system")
+
+    monkeypatch.setattr(pd.DataFrame, f"to_{suffix}", refused)
+    with pytest.raises(OSError, match="Read-only file system") as said:
+        write_measurements(table, path)
+    assert (said.value.filename, said.value.strerror, said.value.errno) == (str(path), "Read-only file system", errno.EROFS)
+    assert main(["import", str(tmp_path / "log.csv"), "-o", str(path)]) == 2
+    assert f"cannot use {path}: Read-only file system. Name another place" in capsys.readouterr().err
+    assert sorted(p.name for p in tmp_path.iterdir() if p.name.startswith((".m", "m."))) == []

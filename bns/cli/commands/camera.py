@@ -45,7 +45,7 @@ def calibrated(options: argparse.Namespace) -> str:
     if options.colours is not None:
         return _coloured(options)
     if options.delay:
-        how = trial_setup(options.robot, options.rig, emulated=options.emulated, speed=math.inf if options.emulated else None)
+        how = trial_setup(_robot(options), options.rig, emulated=options.emulated, speed=math.inf if options.emulated else None)
         return in_words(measured_delay(how))
     if not 5.0 <= options.square_mm <= 1000.0:
         raise HardwareError(f"--square-mm is {options.square_mm:g}; measure the printed square, 5 to 1000 mm.")
@@ -145,11 +145,18 @@ def _coloured(options: argparse.Namespace) -> str:
     return f"{text}\nwritten to {options.colours}; try others with --yellow LOW HIGH, --green LOW HIGH"
 
 
+def _robot(options: argparse.Namespace) -> str:
+    """The robot that is named, or that of the rig, or the Khepera."""
+    if options.robot is not None:
+        return str(options.robot)
+    return "khepera" if options.rig is None else load_rig(options.rig).robot
+
+
 def _looked_at(options: argparse.Namespace, stack: ExitStack) -> tuple[Rig, Clock]:
     """The rig, or its emulation, for as long as the stack is open."""
     if options.rig is None and not options.emulated:
         raise HardwareError("name your set-up with --rig FILE, or look at the emulated one with --emulated.")
-    rig: Rig = shipped_rig(options.robot) if options.rig is None else load_rig(options.rig, options.robot)
+    rig: Rig = shipped_rig(_robot(options)) if options.rig is None else load_rig(options.rig, options.robot)
     if not options.emulated:
         return rig, RealClock()
     clock = EmulatedClock()

@@ -20,7 +20,7 @@ from bns.diagnose.data.located import BEGINS
 from bns.diagnose.data.mapping import mapping_beside
 from bns.diagnose.data.sources.read import read_table
 from bns.diagnose.data.stamps import stamp_scatter
-from bns.diagnose.data.tracker_faults import jumps, without_faults
+from bns.diagnose.data.tracker_faults import excursions, jumps, lasting, without_faults
 from bns.diagnose.data.tracks import Tracks, tracks_of
 from bns.errors import DataError, in_both
 from bns.measurements import DISCARDED, POSE
@@ -117,8 +117,9 @@ def _tracks(table: pd.DataFrame) -> tuple[Tracks, list[Finding]]:
     usable, findings = checked(table)
     tracks = tracks_of(usable)
     found = jumps(tracks)
+    visits = excursions(tracks, found)
     seen = without_faults(tracks, found)
-    return seen, [*_stamp_findings(seen, usable), *findings, *_jump_findings(tracks, usable, found)]
+    return seen, [*_stamp_findings(seen, usable), *findings, *_jump_findings(tracks, usable, lasting(found, visits), visits)]
 
 
 def _stamp_findings(tracks: Tracks, usable: pd.DataFrame) -> Iterator[Finding]:
@@ -129,9 +130,19 @@ def _stamp_findings(tracks: Tracks, usable: pd.DataFrame) -> Iterator[Finding]:
         yield Finding(tracks.names[0], row, scatter.in_words)
 
 
-def _jump_findings(tracks: Tracks, usable: pd.DataFrame, found: NDArray[np.bool_]) -> Iterator[Finding]:
-    """A jump that lasts, in words; ``usable``: the rows that the tracks were made of."""
+def _jump_findings(
+    tracks: Tracks, usable: pd.DataFrame, found: NDArray[np.bool_], visits: Sequence[tuple[int, int]]
+) -> Iterator[Finding]:
+    """Jumps that last and those that are taken back, in words; ``usable``: the rows that the tracks were made of."""
     rows = usable.index.to_numpy()[usable[list(POSE)].notna().all(axis=1).to_numpy()]
+    for begin, end in visits:
+        moved = float(np.hypot(*(tracks.pose[begin] - tracks.pose[begin - 1])[:2]))
+        lost = "pose in between counts" if end - begin == 1 else f"{end - begin} poses in between count"
+        text = (
+            f"the tracked pose jumps away by {1e3 * moved:.0f} mm at {tracks.own_s[begin]:.2f} s and comes back at "
+            f"{tracks.own_s[end]:.2f} s; the {lost} as lost"
+        )
+        yield Finding(tracks.names[tracks.trial[begin]], int(rows[begin]), text)
     for frame in np.flatnonzero(found):
         moved = float(np.hypot(*(tracks.pose[frame] - tracks.pose[frame - 1])[:2]))
         trial = tracks.names[tracks.trial[frame]]

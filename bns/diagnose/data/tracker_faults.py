@@ -1,7 +1,8 @@
 """Which poses a tracker got wrong, judged from the tracks and commands alone: no model has a say in it.
 
-A pose that jumps away and back is taken as lost when a table is read (`checks`). What remains are jumps that last: the
-tracker took another marker, or somebody moved the robot. A window that spans one says nothing of any model.
+A pose that jumps away and back is taken as lost when a table is read (`checks`), and so are several that go away together and
+come back (`excursions`). What remains are jumps that last: the tracker took another marker, or somebody moved the robot. A window
+that spans one says nothing of any model.
 """
 
 from __future__ import annotations
@@ -22,15 +23,24 @@ USUAL = DEFAULTS.data.fault_usual
 MOST_CUT = DEFAULTS.data.fault_most_cut
 FEWEST_FRAMES = DEFAULTS.data.fault_fewest_frames
 AROUND_S = DEFAULTS.data.fault_around_s
+AWAY_S = DEFAULTS.data.fault_away_s
 
 
 def without_faults(tracks: Tracks, found: NDArray[np.bool_] | None = None) -> Tracks:
     """The tracks without what comes after a jump in its trial: where the marker is wrong, its heading is wrong as well.
 
-    Where that would take more than `MOST_CUT` of all poses, jumps are the tracker's habit: they are marked (`Tracks.jumped`),
-    and everything goes on from where the tracker sees the robot. ``found``: what `jumps` gave, where that is known.
+    Poses between a jump and the one that takes it back are lost, and nothing else is. Where the others would take more than
+    `MOST_CUT` of all poses, jumps are the tracker's habit: they are marked (`Tracks.jumped`), and everything goes on from where
+    the tracker sees the robot. ``found``: what `jumps` gave, where that is known.
     """
     found = jumps(tracks) if found is None else found
+    visits = excursions(tracks, found)
+    if visits:
+        away, found = np.zeros(len(found), dtype=bool), lasting(found, visits)
+        for begin, end in visits:
+            away[begin:end] = True
+        tracks = tracks.at_frames([np.flatnonzero(~away[a:b]) + a for a, b in pairwise(tracks.first)])
+        found = found[~away]
     if not found.any():
         return tracks
     count = np.cumsum(found)
@@ -52,6 +62,35 @@ def jumps(tracks: Tracks) -> NDArray[np.bool_]:
         if b - a > 1:
             found[a + 1 : b] = _of_trial(tracks, trial, slice(int(a), int(b)), usual)
     return found if tracks.jumped is None else found & ~tracks.jumped
+
+
+def excursions(tracks: Tracks, found: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Frames at which a pose jumps away and, within `AWAY_S`, back to where the robot may have driven from before it, in pairs.
+
+    That is no further from the last pose before the jump than the faster wheel drove, and turned against it by less than half of
+    what the jump had turned the pose, if it had turned it at all.
+    """
+    out: list[tuple[int, int]] = []
+    back = -1
+    for begin, end in pairwise(np.flatnonzero(found).tolist()):
+        trial = int(tracks.trial[begin])
+        if begin == back or trial != tracks.trial[end] or tracks.t_s[end] - tracks.t_s[begin] > AWAY_S:
+            continue
+        away, home = (_changes(tracks.pose[[begin - 1, at]]) for at in (begin, end))
+        times = tracks.t_s[begin - 1 : end + 1]
+        way = float(_fastest(tracks, trial, times).max()) * float(times[-1] - times[0])
+        turned_back = away[1][0] <= LEAST_RAD or home[1][0] < away[1][0] / 2
+        if home[0][0] <= LEAST_M + way and turned_back:
+            out.append((begin, end))
+            back = end
+    return out
+
+
+def lasting(found: NDArray[np.bool_], visits: list[tuple[int, int]]) -> NDArray[np.bool_]:
+    """The jumps (frames,) that are no part of an excursion."""
+    out = found.copy()
+    out[[frame for visit in visits for frame in visit]] = False
+    return out
 
 
 def spans_jump(tracks: Tracks, start: NDArray[np.int64], end: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -54,6 +54,12 @@ class Data(Bodies, Guesses, Checks, Gaps, Stamps):
         "The fastest wheel command within this time before and after counts, because a robot may lag and clocks may "
         f"differ (`trial_clock_reach_s` is 0.6 s); {BY_HAND}.",
     )
+    fault_away_s: float = setting(
+        2.0,
+        "s",
+        "A pose that jumps away and comes back within this time, to where the robot may have driven, was mistaken in between: "
+        f"only these poses are lost. In a longer time a robot may have driven anywhere; {BY_HAND}.",
+    )
     settled_s: float = setting(
         0.5,
         "s",

@@ -167,7 +167,24 @@ def test_a_robot_is_put_back_once_after_a_drive_without_a_result(driver):
 
     platform.drive = drive
     driver(platform, hands).evaluate(1, CYCLES)
-    assert hands.placed == ["The drive gave no result"] * 2
+    assert hands.placed == ["The drive gave no result: no"] * 2
+
+
+@pytest.mark.parametrize(
+    ("raised", "why"),
+    [(TrialPausedError("the camera is gone"), "the camera is gone"), (KeyboardInterrupt(), "KeyboardInterrupt")],
+)
+def test_a_drive_that_is_interrupted_says_why_in_the_journal(driver, raised, why):
+    platform = drives("")
+
+    def drive(_commands):
+        raise raised
+
+    platform.drive = drive
+    with pytest.raises(type(raised)):
+        driver(platform, Hands()).evaluate(4, CYCLES)
+    assert [(event["evaluation"], event["why"]) for event in events(driver.path, "interrupted")] == [(4, why)]
+    assert past_evaluations(driver.path) == []
 
 
 def test_a_live_view_shows_the_last_stop_in_milliseconds(driver):

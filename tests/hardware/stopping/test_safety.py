@@ -140,6 +140,8 @@ def test_the_operator_is_asked_until_the_answer_makes_sense(capsys):
 def test_with_nobody_there_a_misplaced_robot_pauses_the_trial():
     with pytest.raises(TrialPausedError, match=r"stands 30 cm away, and with --yes there is no operator .*--resume"):
         UnattendedOperator().place(np.zeros(3), "The robot stands 30 cm away")
+    with pytest.raises(TrialPausedError, match=r"is it stuck\? With --yes there is no operator to put it back\. Do so"):
+        UnattendedOperator().place(np.zeros(3), "servo 9 has used 100% of its torque for 1.2 s; is it stuck?")
     assert UnattendedOperator().accept("", ()) == ("next", ())
 
 

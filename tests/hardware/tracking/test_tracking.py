@@ -1,11 +1,13 @@
 """Markers in rendered frames, through a lens that was calibrated on rendered frames."""
 
 import time
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
 import pytest
 
+from bns.cli.commands import camera
 from bns.cli.main import main
 from bns.errors import HardwareError
 from bns.hardware.clock import EmulatedClock
@@ -23,6 +25,7 @@ from bns.hardware.tracking.camera import Frame, FrameTracker, StreamCamera
 from bns.hardware.tracking.colour import ColourDetector, Markers
 from bns.hardware.tracking.kinds import open_tracker
 from bns.hardware.tracking.lens import looking_down
+from bns.registry import PLATFORMS
 
 MATRIX = np.array([[620.0, 0, 482], [0, 620, 268], [0, 0, 1]])
 DISTORTION = np.array([-0.25, 0.08, 0.001, -0.0005, 0.0])
@@ -245,6 +248,21 @@ def test_track_shows_what_is_seen(tmp_path, capsys):
     assert "heading   +90." in said or "heading   +89." in said
     assert len(list((tmp_path / "frames").glob("*.png"))) >= 4
     assert main(["track"]) == 2
+
+
+@pytest.mark.parametrize(("named", "said"), [([], ""), (["--robot", "khepera"], "a rig for snake, and the trial is for khepera")])
+def test_the_robot_is_that_of_the_rig(tmp_path, capsys, named, said):
+    rig = tmp_path / "rig.yaml"
+    rig.write_text(PLATFORMS.load("snake").RIG.read_text())
+    asked = ["track", "--rig", str(rig), "--emulated", "--seconds", "0.5s", *named]
+    assert main(asked) == (2 if said else 0)
+    assert said in capsys.readouterr().err
+    colours = ["calibrate", "--colours", str(tmp_path / "seen.png"), "--rig", str(rig), "--emulated", *named]
+    assert main(colours) == (2 if said else 0)
+    assert said in capsys.readouterr().err
+    assert camera._robot(SimpleNamespace(robot=None, rig=rig)) == "snake"
+    assert camera._robot(SimpleNamespace(robot=None, rig=None)) == "khepera"
+    assert camera._robot(SimpleNamespace(robot="khepera", rig=rig)) == "khepera"
 
 
 def test_a_camera_that_is_not_there(tmp_path, clock):
