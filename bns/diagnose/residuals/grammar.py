@@ -32,6 +32,8 @@ RESPONSE_ALONE = {LEFT: "response of the left wheel in time", RIGHT: "response o
 """What an effect that acts alike on both wheels cannot be: beside a lag of both, the other lag of one."""
 SLOWING = "response of each wheel in time while it slows down"
 SESSION = "time of the session"
+DRIFT = "time of the session, whatever the turn rate"
+"""A turn of its own that grows during the session: a gyro that holds the heading, and drifts."""
 CHANGES = "changes of speed of each wheel"
 CHANGES_ALONE = {LEFT: "changes of speed of the left wheel", RIGHT: "changes of speed of the right wheel"}
 """What one wheel loses while it speeds up: a tyre with less grip, a joint that gives."""
@@ -203,6 +205,7 @@ def _of_tracks(predictor: Predictor, seen: dict[str, Array], wheelbase_m: float)
         later = _hats("t", [first + share * (last - first) for share in LATER_KNOTS])[1:]
         for on, now in ((LEFT, "u"), (RIGHT, "u"), ("w", "w")):
             yield Family(SESSION, on, tuple(f"{now} * {h}" for h in later))
+        yield Family(DRIFT, "w", tuple(f"moving * {h}" for h in later))
     yield from _straight(seen, wheelbase_m)
     turns = ("cos(heading)", "sin(heading)", "cos(2*heading)", "sin(2*heading)")
     uphill = ("moving * cos(heading)", "moving * sin(heading)")  # a slope on which wheels do not slip sideways

@@ -40,6 +40,17 @@ def session(term: Formula, predictor: Predictor) -> str:
     return f"{whose} {slower(-share[most])} at {seconds(grid[most])} of the session than at its beginning"
 
 
+def drift(term: Formula, predictor: Predictor) -> str:
+    """Where in the session the robot turns most otherwise than at its beginning."""
+    t_s = predictor.tracks.session_s
+    grid = np.linspace(float(t_s.min()), float(t_s.max()), POINTS)
+    change = np.degrees(curve_of(term, "t", grid, moving=1.0))
+    most = int(np.abs(change).argmax())
+    side = "left" if change[most] > 0.0 else "right"
+    turns = f"the robot turns {abs(change[most]):.2g} °/s further to the {side}"
+    return f"{turns} at {seconds(grid[most])} of the session than at its beginning, whenever it moves"
+
+
 def share_by_heading(term: Formula, _: Predictor) -> str:
     """At which heading all velocities are lowest and highest."""
     grid = np.linspace(-np.pi, np.pi, POINTS)

@@ -14,6 +14,7 @@ from bns.diagnose.residuals.grammar import (
     BY_DIRECTION,
     CHANGES,
     CHANGES_ALONE,
+    DRIFT,
     LOGGED,
     LOGGED_OFFSET,
     PLACE,
@@ -35,6 +36,7 @@ from bns.diagnose.residuals.past_in_words import changes, one_wheel, response, r
 from bns.diagnose.residuals.phrases import POINTS, VELOCITIES, curve_of, slower
 from bns.diagnose.residuals.places_in_words import (
     at_places,
+    drift,
     session,
     share_by_heading,
     time_in_trial,
@@ -230,6 +232,7 @@ def _largest(term: Formula, predictor: Predictor) -> str:
 _SAID: dict[tuple[str, str], Callable[[Formula, Predictor], str]] = {
     ("time in the trial", "share"): time_in_trial,
     **{(SESSION, on): session for on in (SHARE, LEFT, RIGHT, "w")},
+    (DRIFT, "w"): drift,
     ("heading", "share"): share_by_heading,
     (PLACE, "share"): at_places,
     (SPEED_THERE, "v"): at_places,
