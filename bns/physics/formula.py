@@ -68,6 +68,8 @@ PAST: Mapping[str, str] = {
 WITH_PAST = (*WHICH_WHEELS, "v", "w")
 _MAGNITUDES = tuple((sign * size,) for size in (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 3.0, 10.0) for sign in (1.0, -1.0))
 """Where the fit of a nonlinear term's only number begins: far from it a limit limits nothing, and no slope leads back."""
+_SIZES = tuple(sign * size for sign in (1.0, -1.0) for size in (1.0, 0.1, 0.01, 1e-3, 10.0))
+"""Where the numbers of a term begin that it is not linear in: a rate of something in seconds may be one in an hour."""
 RECENT_S = 0.15
 NEVER_M = 1e3
 LARGEST = 1e9
@@ -101,16 +103,20 @@ def formula_effect(
     logged, unknown = _sorted(name, code.names - known, set(columns), None if numbers is None else set(numbers))
     if not unknown:
         raise ModelError(f"formula {name}: {term!r} has no number to fit; multiply it by one, as in k * ({term}).")
-    linear = _is_linear(code, unknown)
+    nothing = _linear_numbers(code, unknown)  # where these are nothing, so is the term
     placed = bool(code.names & _PLACE) or on in {"east", "north"}
     return Effect(
         name=name,
         stage="body",
         parameters=tuple(
-            Parameter(p, "1", -LARGEST, LARGEST, (-10.0, 10.0), 0.0 if linear or p == unknown[0] else 1.0, "of a formula")
+            Parameter(
+                p, "1", -LARGEST, LARGEST, (-10.0, 10.0), 0.0 if p in nothing else 1.0, "of a formula", of_any_size=True
+            )
             for p in unknown
         ),
-        starts=((0.0,) * len(unknown),) if linear else _MAGNITUDES if len(unknown) == 1 else (),
+        starts=_MAGNITUDES
+        if len(unknown) == 1 and not _is_linear(code, unknown)
+        else tuple(dict.fromkeys(tuple(0.0 if p in nothing else size for p in unknown) for size in _SIZES)),
         equation=f"{on}' = {on} + {term}",
         residuals="as the formula says",
         lookalikes=(),
@@ -119,6 +125,31 @@ def formula_effect(
         needs_place=placed,
         revision=2 if placed else 1,
     )
+
+
+def _linear_numbers(code: Compiled, numbers: Sequence[str]) -> list[str]:
+    """Those numbers in which a term is a sum of them times something else each, the others held; if there is none, the first."""
+    of_each = [p for p in numbers if _is_straight(code, numbers, p)]
+    found = of_each if of_each and _is_linear(code, of_each) else [p for p in of_each if _is_linear(code, [p])][:1]
+    return found or [numbers[0]]
+
+
+def _is_straight(code: Compiled, numbers: Sequence[str], one: str) -> bool:
+    """Whether a term is on a straight line over one of its numbers."""
+    rng = np.random.default_rng(0)
+    rest: dict[str, Any] = {n: rng.uniform(0.1, 0.9, 16) for n in sorted(code.names - set(numbers))}
+    rest[AGO] = lambda from_s, to_s: np.linspace(from_s, to_s, 16)
+    others = {n: rng.normal(size=1)[0] for n in numbers}
+    for at, apart in rng.normal(size=(4, 2)):
+        try:
+            low, middle, high = (
+                np.asarray(code.value({**rest, **others, one: at + k * apart}), dtype=np.float64) for k in (-1, 0, 1)
+            )
+        except ArithmeticError:
+            return False
+        if not (np.isfinite(low).all() and np.isfinite(high).all() and np.allclose(low + high, 2 * middle)):
+            return False
+    return True
 
 
 def _is_linear(code: Compiled, numbers: Sequence[str]) -> bool:

@@ -103,17 +103,19 @@ class CasterSwing(Cause):
 
 @dataclass
 class CasterTrail(Cause):
-    """A caster whose hinge is half a wheelbase ahead drags while it points another way than its hinge moves; it trails."""
+    """A caster drags while it points another way than its hinge moves, ``pivot_m`` ahead of the axle or behind it; it trails."""
 
     loss: float
     trail_m: float
+    pivot_m: float
 
     def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
-        pivot = wheels.mean(axis=2) + 0.5j * (wheels[..., 1] - wheels[..., 0])
+        yaw = (wheels[..., 1] - wheels[..., 0]) / BASE_M
+        pivot = wheels.mean(axis=2) + 1j * self.pivot_m * yaw
         caster, out = np.zeros(len(wheels)), np.empty_like(wheels)
         for i in range(wheels.shape[1]):
             speed = np.abs(pivot[:, i])
-            turn = np.where(speed > 1e-3, 2 * pivot[:, i].imag / BASE_M, 0.0)
+            turn = np.where(speed > 1e-3, yaw[:, i], 0.0)
             kept = 0.0
             for _ in range(FINE):
                 off = np.where(speed > 1e-3, np.angle(pivot[:, i] * np.exp(-1j * caster)), 0.0)

@@ -20,7 +20,10 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
     ),
     "backlash": ({"gap_m": 0.004}, {"gap_m": 0.01}),
     "caster-swing": ({"loss": 0.3, "trail_m": 0.03}, {"loss": 0.6, "trail_m": 0.05}),
-    "caster-trail": ({"loss": 0.3, "trail_m": 0.015}, {"loss": 0.6, "trail_m": 0.03}),
+    "caster-trail": (
+        {"loss": 0.3, "trail_m": 0.015, "pivot_m": 0.0442},
+        {"loss": 0.6, "trail_m": 0.03, "pivot_m": -0.06},
+    ),
     "caster-drag": (
         {"friction_m_s": 0.005, "damping_m": 0.002, "trail_m": 0.015, "pivot_m": -0.05},
         {"friction_m_s": 0.015, "damping_m": 0.004, "trail_m": 0.03, "pivot_m": -0.05},

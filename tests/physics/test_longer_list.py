@@ -61,7 +61,8 @@ def test_a_casters_drag_does_not_depend_on_the_steps(name):
         zero = np.zeros_like(speed)
         left, right = speed - turn * B / 2, speed + turn * B / 2
         body = Body(speed, zero, turn, zero + 1, left, right, (end - step_s / 2)[None], wheelbase_m=B, step_s=step_s[None])
-        slowed = effect_named(name).apply(body, loss=0.6, trail_m=0.03)
+        pivot = {"pivot_m": B / 2} if name == "caster-trail" else {}
+        slowed = effect_named(name).apply(body, loss=0.6, trail_m=0.03, **pivot)
         return float((slowed.forward_m_s * step_s).sum())
 
     coarse = np.array([*[0.08] * 7, 0.04, *[0.08] * 9, *[0.08] * 5, 0.04])
@@ -70,38 +71,39 @@ def test_a_casters_drag_does_not_depend_on_the_steps(name):
 
 
 def test_a_caster_that_trails_falls_to_a_side_at_reversals():
-    driven = way("caster-trail", loss=0.5, trail_m=0.02)
+    driven = way("caster-trail", loss=0.5, trail_m=0.02, pivot_m=B / 2)
     assert driven[0] == pytest.approx(0.1)
     way_m = 0.0
     for _ in range(10_000):  # from half a degree beside backwards, tan(off/2) = 200, it falls by exp(-way/trail)
         tangent = 200 * np.exp(-way_m / 0.02)
         way_m += 0.1 * (1 - 0.5 * tangent**2 / (1 + tangent**2)) * 1e-4
     assert driven[1] == pytest.approx(-way_m, abs=1e-5)
-    slower = way("caster-trail", loss=0.5, trail_m=0.05)
+    slower = way("caster-trail", loss=0.5, trail_m=0.05, pivot_m=B / 2)
     assert abs(slower[1]) < abs(driven[1])
 
 
+@pytest.mark.parametrize("pivot_m", [B / 2, -0.7 * B])
 @pytest.mark.parametrize(("loss", "trail_m"), [(0.3, 0.005), (0.8, 0.02), (0.5, 0.2)])
-def test_a_caster_swings_round_as_its_wheel_rolls(loss, trail_m):
+def test_a_caster_swings_round_as_its_wheel_rolls(loss, trail_m, pivot_m):
     """Against the wheel's path: the caster's wheel is pulled behind its hinge, and never moves across the way it points."""
     rng = np.random.default_rng(2)
     speed, turn = np.repeat(rng.uniform(-0.2, 0.2, (1, 6)), 10, axis=1), np.repeat(rng.uniform(-2, 2, (1, 6)), 10, axis=1)
     zero, step_s = np.zeros_like(speed), np.full_like(speed, 0.04)
     sides = speed - turn * B / 2, speed + turn * B / 2
     body = Body(speed, zero, turn, zero + 1, *sides, np.cumsum(step_s, axis=1), wheelbase_m=B, step_s=step_s)
-    kept = (effect_named("caster-trail").apply(body, loss=loss, trail_m=trail_m).forward_m_s / speed)[0]
-    heading, hinge, wheel, small_s = 0.0, np.array([B / 2, 0.0]), np.array([B / 2 - trail_m, 0.0]), 1e-4
+    kept = (effect_named("caster-trail").apply(body, loss=loss, trail_m=trail_m, pivot_m=pivot_m).forward_m_s / speed)[0]
+    heading, hinge, wheel, small_s = 0.0, np.array([pivot_m, 0.0]), np.array([pivot_m - trail_m, 0.0]), 1e-4
     axle = np.zeros(2)
     for v, w, share in zip(speed[0], turn[0], kept, strict=True):
         summed, n = 0.0, round(0.04 / small_s)
         for _ in range(n):
             ahead = np.array([np.cos(heading), np.sin(heading)])
             across = np.array([-ahead[1], ahead[0]])
-            moves, points = v * ahead + w * B / 2 * across, (hinge - wheel) / trail_m
+            moves, points = v * ahead + w * pivot_m * across, (hinge - wheel) / trail_m
             left = 1 - loss * (1 - moves @ points / np.hypot(*moves)) / 2
             summed += left / n
             axle, heading = axle + left * v * ahead * small_s, heading + left * w * small_s
-            hinge = axle + B / 2 * np.array([np.cos(heading), np.sin(heading)])
+            hinge = axle + pivot_m * np.array([np.cos(heading), np.sin(heading)])
             wheel = wheel + (moves @ points) * left * points * small_s
             wheel = hinge - trail_m * (hinge - wheel) / np.hypot(*(hinge - wheel))
         assert share == pytest.approx(summed, abs=2e-3)

@@ -27,6 +27,8 @@ def scan(bus: ServoBus, options: argparse.Namespace) -> int:
         print(servo, flush=True)
     more = "" if options.all_bauds else " (1 Mbaud and new ones; --all-bauds tries others)"
     print(f"{len(found)} ids answer{more}" if found else f"no servo answers{more}; is the supply on, is the cable connected?")
+    if found and not any(servo.model for servo in found):
+        print("no answer is one of a servo: is this the port of the bus, and its rate? A line without servos may be noisy, too")
     return 0 if found and all(servo.model for servo in found) else 2
 
 

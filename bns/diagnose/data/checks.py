@@ -13,7 +13,7 @@ import pandas as pd
 
 from bns.diagnose.data.apply_mapping import repeated
 from bns.diagnose.data.odd_commands import half_told, never_told, refuse_untold, untold_trials
-from bns.diagnose.data.still_heading import refuse_still_heading
+from bns.diagnose.data.still_heading import refuse_still_coordinate, refuse_still_heading
 from bns.diagnose.data.units import check_units
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
@@ -69,6 +69,7 @@ def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     trials = rows_by_trial(usable)
     refuse_untold(usable, trials)
     refuse_still_heading(usable, trials)
+    refuse_still_coordinate(usable, trials)
     note = check_units(usable, trials)
     unit: tuple[int, str] | None = (int(usable.index[0]), note) if note else None
     oddities = (unit, odd, untold_trials(usable, trials), never_told(usable), _nameless(table))

@@ -202,6 +202,8 @@ def _check_entry(name: str, entry: Mapping[str, Any]) -> None:
         value = entry[key]
         if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < math.inf:
             raise DataError(f"{name}: {key} is {shown(value)}; it must be a number.")
+        if key == "scale" and value == 0:
+            raise DataError(f"{name}: scale is 0, so that every value would be the same; it must be another number.")
     for key in (key for key in _FLAGS if key in entry):
         if not isinstance(entry[key], bool):
             raise DataError(f"{name}: {key} is {shown(entry[key])}; it must be true or false.")

@@ -78,6 +78,8 @@ def _with_run_up(table: pd.DataFrame, t: NDArray[np.float64]) -> pd.DataFrame:
     poses = {name: np.nan for name in POSE if name in table.columns}
     for number in range(int(trial.max()) + 1):
         own = np.flatnonzero(trial == number)
+        if not len(own):  # nothing was logged for so long
+            continue
         began = t[own[0]]
         ahead = np.flatnonzero((t >= began - RUN_UP_S - 1e-9) & (np.arange(len(t)) < own[0]))
         rows = table.iloc[own].assign(**{RUN_UP: 0})

@@ -1,8 +1,8 @@
-"""A heading that never changes although the robot is driven round: no heading was measured."""
+"""A heading that never changes although the robot turns, or a coordinate although it drives along it: none was measured."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pandas as pd
@@ -32,6 +32,34 @@ def refuse_still_heading(table: pd.DataFrame, trials: Sequence[tuple[str, np.nda
             "faces, counter-clockwise from x. Take it from another column of the tracker; from a quaternion in the order "
             "x, y, z, w."
         )
+
+
+def refuse_still_coordinate(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -> None:
+    """DataError if x or y is the very same in all poses of a robot that drives along it by its commands and headings.
+
+    ``trials``: names and row numbers.
+    """
+    for name, other, along in (("x_m", "y_m", np.cos), ("y_m", "x_m", np.sin)):
+        values = table[name].dropna().to_numpy(dtype=float)
+        if len(values) < 2 or np.ptp(values) > 0.0 or np.ptp(table[other].dropna()) < _TURNED_M:
+            continue
+        furthest = max((_driven_m(table.iloc[rows], along) for _, rows in trials), default=0.0)
+        if furthest > _TURNED_M and moved(table, trials):
+            raise DataError(
+                f"{name} is {values[0]:.6g} in all poses, although {other} changes and the robot drives up to {furthest:.2g} m "
+                f"along it by its commands and headings: it is no measured position. Take {name} from another column of the "
+                "tracker; in a mapping, look at its scale."
+            )
+
+
+def _driven_m(rows: pd.DataFrame, along: Callable[[np.ndarray], np.ndarray]) -> float:
+    """How far apart two places of a trial are along an axis, by commands and headings alone, m."""
+    speed = rows[list(COMMANDS[:2])].fillna(0.0).to_numpy(dtype=float).mean(axis=1)
+    heading = rows["heading_rad"].ffill().bfill().to_numpy(dtype=float)
+    if not np.isfinite(heading).all():
+        return 0.0
+    way = np.cumsum(np.append(0.0, (speed * along(heading))[:-1] * np.diff(rows["t_s"].to_numpy(dtype=float))))
+    return float(np.ptp(way))
 
 
 def _turned_m(rows: pd.DataFrame) -> float:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,6 +36,7 @@ from bns.diagnose.estimate.significance import PairedComparison, chance, jackkni
 from bns.diagnose.predict.base import Predictor, Steps
 from bns.diagnose.settings import DEFAULTS
 from bns.engine.pose_filter import TRUSTED
+from bns.errors import ModelError
 from bns.physics.model import Model
 
 _LATELY = 16
@@ -44,6 +46,7 @@ _SETTLED = DEFAULTS.estimate.fit_settled
 _TRUSTED = DEFAULTS.estimate.fit_trusted
 _LOOKS = DEFAULTS.estimate.look_rounds
 _RULED = DEFAULTS.estimate.slope_ruled
+_SHORTER = DEFAULTS.estimate.slope_shorter
 
 
 @dataclass(frozen=True)
@@ -198,9 +201,10 @@ class Problem:
         """Where a step leads that does not raise the loss, and the damping for the next; None if there is none."""
         for _ in range(8):
             step = damped_step(*equations, damping)
-            there = self._point(self._moved(at.model, free, reduced, step, damping))
-            if np.isfinite(there.loss) and there.loss <= at.loss:
-                return there, max(damping / 10, 1e-9)
+            with suppress(ModelError):  # a formula has no value there
+                there = self._point(self._moved(at.model, free, reduced, step, damping))
+                if np.isfinite(there.loss) and there.loss <= at.loss:
+                    return there, max(damping / 10, 1e-9)
             damping *= 10
         return None
 
@@ -274,12 +278,17 @@ class Problem:
         Far from the truth the filter is reset in some trials (`innovations`), and a change of the number by a thousandth can
         move where: a jump by more than the filter trusts any pose, whose slope says that these trials alone know the number.
         Bodies, which have no such filter, have wide slopes instead; where a number has steps of its own, they are no such jumps.
+        The change of a number of any size is shortened until it moves no pose by as much: what multiplies 1000 s squared is tiny.
         """
-        slope = self._difference(at, free, j, by)
+        slope, p = self._difference(at, free, j, by), free[j].parameter
+        for _ in range(_SHORTER if p.of_any_size else 0):
+            if float(np.abs(slope * by).max(initial=0.0)) <= TRUSTED:
+                break
+            by /= 10
+            slope = self._difference(at, free, j, by)
         if self.predictor.luck is not None:
             return slope
-        steepness = self.per_trial((slope**2).sum(axis=1))
-        p, other = free[j].parameter, free[j].of(at.model) - by
+        steepness, other = self.per_trial((slope**2).sum(axis=1)), free[j].of(at.model) - by
         jumps = not p.jagged and float(np.abs(slope * by).max(initial=0.0)) > TRUSTED
         if not (jumps or steepness.max() > _RULED * steepness.sum()) or not p.low <= other <= p.high:
             return slope

@@ -45,7 +45,7 @@ def implausible(fit: Fit, name: str, bounds: bool = True) -> str:
         value, (low, high) = float(fit.values[index]), fit.interval(index)
         if bounds and _stopped(p, value):
             return f"{p.name} is at its bound, {value:g}{with_unit(p.unit)}"
-        if np.isfinite([low, high]).all() and (high < p.plausible[0] or low > p.plausible[1]):
+        if not p.of_any_size and np.isfinite([low, high]).all() and (high < p.plausible[0] or low > p.plausible[1]):
             least, most = p.plausible
             return f"{p.name} = {value:g}{with_unit(p.unit)} is outside of the plausible range, {least:g} to {most:g}"
     return ""
@@ -57,7 +57,8 @@ def believable(fit: Fit, name: str) -> Model | None:
     An interval by the curvature is as wide upwards as downwards; it may hold plausible numbers with which the loss is far higher.
     """
     own = {f.parameter.name: (f.parameter, float(v)) for f, v in zip(fit.free, fit.values, strict=True) if f.effect == name}
-    outside = {key for key, (p, value) in own.items() if not (p.plausible[0] <= value <= p.plausible[1] or _stopped(p, value))}
+    ranged = {key: (p, value) for key, (p, value) in own.items() if not (p.of_any_size or _stopped(p, value))}
+    outside = {key for key, (p, value) in ranged.items() if not p.plausible[0] <= value <= p.plausible[1]}
     if not outside:
         return None
     active = next(a for a in fit.model.effects if a.effect.name == name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from math import prod
@@ -16,6 +16,7 @@ from bns.diagnose.estimate.look_around import lower_place
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.settings import DEFAULTS
+from bns.errors import ModelError
 from bns.physics.effect import Effect, Parameter
 from bns.physics.model import Model
 from bns.physics.order import FORMULAS, FRICTION, RAMPS
@@ -56,7 +57,10 @@ def fitting(effect: Effect, model: Model, tracks: Tracks | None) -> Effect:
         return scaled
     low, high = np.quantile(tracks.pose[:, :2], [0.02, 0.98], axis=0)
     within = scaled.within(low, high)
-    return within if tracks.relative else within.lasting(float(tracks.own_s.max()))
+    if tracks.relative:
+        return within
+    fastest = max((float(np.abs(told).max(initial=0.0)) for told in (tracks.left_m_s, tracks.right_m_s)), default=0.0)
+    return (within.told(fastest) if fastest > 0.0 else within).lasting(float(tracks.own_s.max()))
 
 
 def fit_with(problem: Problem, base: Fit, effect: Effect, known: Model | None = None) -> Fit:
@@ -70,7 +74,20 @@ def fit_with(problem: Problem, base: Fit, effect: Effect, known: Model | None = 
     start = best_start(problem, base, effect, known)
     hoped = min(start.loss, start.promised) if problem.predictor.screening is None else start.loss
     hopeless = base.loss - hoped < NOTHING * base.loss / len(base.losses)
-    return on_either_side(problem, problem.fit(start.model, 0 if hopeless else None, start.jacobian_by_parameter), effect)
+    fit = problem.fit(start.model, 0 if hopeless else None, start.jacobian_by_parameter)
+    if effect.after == FORMULAS and len(effect.starts) > 1 and not hopeless:
+        fit = _further(problem, fit)
+    return on_either_side(problem, fit, effect)
+
+
+def _further(problem: Problem, fit: Fit) -> Fit:
+    """The fit again from where it ended while that is lower: a number that began a hundred times too small has a long way."""
+    for _ in range(_LOOKS):
+        again = problem.fit(fit.model)
+        if again.loss >= fit.loss:
+            break
+        fit = again
+    return fit
 
 
 def on_either_side(problem: Problem, fit: Fit, effect: Effect) -> Fit:
@@ -127,15 +144,31 @@ def best_start(problem: Problem, base: Fit, effect: Effect, known: Model | None 
     starts = [base.model.with_active(effect, values) for values in found]
     if known is not None and effect.name in {active.effect.name for active in known.effects}:
         starts.append(base.model.with_active(effect, tuple(known.values_of(effect.name).values())))
-    losses = [problem.loss(start) for start in starts]
+    losses = _losses(problem, starts)
     if effect.after == FORMULAS and len(effect.parameters) == 1:
         tried = [next(iter(start.values_of(effect.name).values())) for start in starts]
         between = _beside_idle(tried, losses, base.loss)
         more = [base.model.with_active(effect, (value,)) for value in between]
-        starts, losses = [*starts, *more], [*losses, *(problem.loss(start) for start in more)]
+        starts, losses = [*starts, *more], [*losses, *_losses(problem, more)]
     beside = {active.effect.name for active in base.model.effects} & set(effect.lookalikes)
-    followed = range(len(starts)) if beside and any(p.jagged for p in effect.parameters) else [int(np.argmin(losses))]
+    all_of_them = beside and any(p.jagged for p in effect.parameters)
+    all_of_them = all_of_them or (effect.after == FORMULAS and len(effect.parameters) > 1)  # nothing yet, whatever the others are
+    followed = range(len(starts)) if all_of_them else [int(np.argmin(losses))]
     return min((_stepped(problem, base, starts[i], losses[i]) for i in followed), key=lambda one: one.loss)
+
+
+def _losses(problem: Problem, starts: Sequence[Model]) -> list[float]:
+    """Infinite where a formula has no value; ModelError if it has none anywhere."""
+    out, wrong = [], None
+    for start in starts:
+        try:
+            out.append(problem.loss(start))
+        except ModelError as error:
+            out.append(np.inf)
+            wrong = error
+    if wrong is not None and not np.isfinite(out).any():
+        raise wrong
+    return out
 
 
 def _beside_idle(values: list[float], losses: list[float], idle: float) -> list[float]:
@@ -150,8 +183,11 @@ def _beside_idle(values: list[float], losses: list[float], idle: float) -> list[
 
 
 def _stepped(problem: Problem, base: Fit, start: Model, loss: float) -> StartingPoint:
-    """One step of least squares from a start, or the start itself where that is lower."""
-    stepped = problem.gauss_newton_step(start, base)
+    """One step of least squares from a start, or the start itself where that is lower or no step leads anywhere."""
+    try:
+        stepped = problem.gauss_newton_step(start, base)
+    except ModelError:  # a formula has no value there
+        return StartingPoint(start, loss, loss, {})
     return stepped if stepped.loss < loss else replace(stepped, model=start, loss=loss)
 
 

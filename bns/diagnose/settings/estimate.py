@@ -99,6 +99,12 @@ class Estimate:
         "How far to either side of where a fit of a body ended lower places are looked for, as a fraction of the plausible range "
         "(of a factor by ratio); within `wide_step`, so that nothing is simulated for it.",
     )
+    slope_shorter: int = setting(
+        10,
+        "times",
+        "The step for the slope of a number in a formula is divided by ten at most this often, until it moves no innovation by "
+        "more than the filter trusts one: a term in the square of 1000 s needs six, in its cube nine.",
+    )
     look_steps: int = setting(
         7, "values", "Number of values tried on each side: with one every fiftieth of the range, valleys as narrow are seen."
     )

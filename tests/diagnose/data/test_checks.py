@@ -311,7 +311,7 @@ def test_turns_of_more_than_half_a_round_between_two_poses_are_not_held_against_
     pose = {"x_m": 0.0, "y_m": 0.0, "heading_rad": np.angle(np.exp(1j * turned))}
     speeds = {"left_m_s": np.append(np.full(40, 0.02), np.nan), "right_m_s": np.append(np.full(40, 0.206), np.nan)}
     table = pd.DataFrame({"trial": 0, "t_s": np.cumsum(np.append(0.0, lasts)), **speeds, **pose})
-    checked(table.assign(x_m=0.02 * np.arange(41)))
+    checked(table.assign(x_m=0.02 * np.arange(41), y_m=1e-9 * np.arange(41)))
 
 
 def test_minutes_are_told_from_inches_and_degrees():
@@ -335,6 +335,19 @@ def test_a_robot_at_rest_that_was_told_nothing_is_listed(table):
 def test_a_heading_that_stays_is_right_where_nothing_turns_the_robot(table):
     straight = table.assign(right_m_s=table.left_m_s, heading_rad=0.0)
     assert len(checked(straight)[0]) == len(table)
+
+
+@pytest.mark.parametrize(("name", "other"), [("x_m", "y_m"), ("y_m", "x_m")])
+def test_a_coordinate_that_never_changes_while_the_robot_drives_along_it_is_none(table, name, other):
+    with pytest.raises(DataError, match=rf"^{name} is 1 in all poses, although {other} changes and the robot drives up to \d"):
+        checked(table.assign(**{name: 1.0}))
+
+
+def test_a_coordinate_that_stays_is_right_where_the_robot_drives_along_the_other(table):
+    straight = table.assign(right_m_s=table.left_m_s, heading_rad=np.pi / 2, x_m=1.0)
+    assert len(checked(straight)[0]) == len(table)
+    rest = table.assign(left_m_s=0.0, right_m_s=0.0, heading_rad=0.3, x_m=1.0, y_m=2.0)
+    assert len(checked(rest)[0]) == len(table)
 
 
 def test_rows_that_were_written_twice_are_one_finding_of_a_trial_and_no_slow_tracker(table):

@@ -38,6 +38,15 @@ def log():
     return long_log(LIMITED)
 
 
+def test_where_nothing_was_logged_for_longer_than_a_piece_there_is_none(log):
+    """Of 60 s in pieces of 5 s, those from 20 to 40 s."""
+    minute = log[log.t_s < 60.0]
+    pieces = split(minute[(minute.t_s < 18.0) | (minute.t_s > 42.0)].reset_index(drop=True), "lasting_s", 5.0)
+    whole = set(split(minute.reset_index(drop=True), "lasting_s", 5.0).trial)
+    assert whole - set(pieces.trial) == {4, 5, 6, 7}
+    assert pieces.groupby("trial").t_s.max().max() < 10.0  # what is left at the end is part of the last
+
+
 @pytest.fixture(scope="module")
 def pieces(log):
     return split(log, "lasting_s", 20.0)

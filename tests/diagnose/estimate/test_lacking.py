@@ -1,5 +1,6 @@
 """A fit without one of its effects, where another term does the same with the opposite sign."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -21,8 +22,12 @@ def predictor():
 
 @cache
 def shared(gain):
-    """A gain of 1.01 in two parts: too much of it by the effect, and the rest taken back by a term."""
-    term = formula_effect("term", "k0", "share")
+    """A gain of 1.01 in two parts: too much of it by the effect, and the rest taken back by a term.
+
+    The term's number is taken with steps of one size, which mislead far from where it is best.
+    """
+    free = formula_effect("term", "k0", "share")
+    term = replace(free, parameters=tuple(replace(p, of_any_size=False) for p in free.parameters))
     model = NOMINAL.with_effect("speed-gain", gain=gain).with_active(term, (1.01 / gain - 1.0,))
     problem = problem_for(predictor(), model)
     return problem, problem.fit(model, 0)

@@ -60,6 +60,15 @@ def test_two_servos_of_one_id_are_noticed(bus, capsys):
     assert "Connect one servo alone: id 1 at 1000000 baud: garbled" in said.err
 
 
+def test_a_line_on_which_nothing_is_a_servo_is_said_to_be_none(bus, capsys):
+    _, port = bus(1, 1)
+    code, said = call(capsys, "scan", "--port", port)
+    assert code == 2
+    assert said.out.splitlines()[-1].startswith("no answer is one of a servo: is this the port of the bus, and its rate?")
+    _, port = bus(1, 1, 2)
+    assert "no answer is one of a servo" not in call(capsys, "scan", "--port", port)[1].out
+
+
 def test_two_servos_of_one_id_that_answer_one_after_the_other_are_noticed(bus, capsys):
     """A new servo waits half a millisecond with its answer, one that was set up does not."""
     servos, port = bus(1, 1, 2)
