@@ -41,7 +41,7 @@ class LadderFigure:
             [v for v in (*values["rms"], *values["high"]) if np.isfinite(v)], default=1.0
         )
         self._noise.location = 1e3 * e.noise_floor_m if np.isfinite(e.noise_floor_m) else 0
-        self.figure.title.text = "Error and its 95 % interval; dotted: noise of the tracking"
+        self.figure.title.text = "Error, 95 % interval; dotted: tracking noise"
 
 
 class WindowFigures:

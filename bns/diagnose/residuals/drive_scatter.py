@@ -89,10 +89,11 @@ def scatter_in_words(predictor: Predictor, noise: Array, errors: PairedErrors) -
         ]
     ahead, aside, turn = 1e3 * noise[2], 1e3 * noise[3], np.degrees(noise[4])
     return [
-        f"The error over {IN_WORDS[horizon]} ({1e3 * error:.3g} mm) is above tracking noise ({1e3 * floor:.3g} mm) because the "
-        f"drive itself scatters: by {ahead:.3g} mm ahead, {aside:.3g} mm to the side and {turn:.3g}° in the first metre, and "
-        f"with the root of the way, which makes {1e3 * by_drive:.3g} mm. No model predicts such scatter: no listed effect and "
-        "no curve finds a pattern in it."
+        f"The error over {IN_WORDS[horizon]} ({1e3 * error:.3g} mm) is above tracking noise ({1e3 * floor:.3g} mm) as if the "
+        f"drive itself scattered: by {ahead:.3g} mm ahead, {aside:.3g} mm to the side and {turn:.3g}° in the first metre, and "
+        f"with the root of the way, which makes {1e3 * by_drive:.3g} mm. No listed effect and no curve finds a pattern in it. "
+        "It may be chance, such as wheels that slip, or finer than these look, such as joints of a floor. Drive the same "
+        "commands from the same place several times: what they share, a model can predict."
     ]
 
 

@@ -157,7 +157,8 @@ class DynamixelChain:
                 return data
             else:
                 problem = problem or str(self._packets.getTxRxResult(result))
-        raise ServoError(f"servo {number}: {what}: {problem}; asked {attempts} times")
+        often = "once" if attempts == 1 else f"{attempts} times"
+        raise ServoError(f"servo {number}: {what}: {problem}; asked {often}")
 
     def _hardware_error(self, number: int, bits: int) -> int:
         """The register that says which alarm, where the packets only say that there is one."""

@@ -81,6 +81,7 @@ def test_it_is_said_where_it_makes_the_error_and_the_error_is_above_noise():
     assert f"over 5 seconds ({1.2e3 * by_drive:.3g} mm)" in said
     assert f"which makes {1e3 * by_drive:.3g} mm" in said
     assert "8 mm ahead, 4 mm to the side and 2.86°" in said
+    assert "It may be chance" in said
     (said,) = scatter_in_words(predictor, NOISE, errors(1.7 * by_drive))  # something else makes most of it
     assert f"({1.7e3 * by_drive:.3g} mm) is far above tracking noise (2 mm)" in said
     assert f"makes only {1e3 * by_drive:.3g} mm. In the rest no listed effect" in said
@@ -176,7 +177,7 @@ def test_a_diagnosis_that_finds_nothing_says_so_and_one_that_cannot_tell_does_no
     driven = measured(NOMINAL, trials=24, seed=5, noise=(0.0, 0.0), jitter=0.0, commands=12)
     found = diagnosing.diagnose(WheelPredictor(tracks_of(scattered(driven, np.random.default_rng(1)))), NOMINAL)
     assert found.verdict == (verdict or "none")
-    said = [note for note in found.notes if "drive itself scatters" in note]
+    said = [note for note in found.notes if "as if the drive itself scattered" in note]
     assert len(said) == (not verdict)
     if said:
         numbers = [float(one) for one in re.findall(r"by ([\d.]+) mm ahead, ([\d.]+) mm to the side and ([\d.]+)°", said[0])[0]]
