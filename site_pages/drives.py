@@ -34,7 +34,7 @@ VALUES: dict[str, dict[str, float]] = {
     "camera-scale": {"factor": 1.1},
     "caster-drag": {"friction_m_s": 0.03, "damping_m": 0.01, "trail_m": 0.02, "pivot_m": -0.05},
     "caster-swing": {"loss": 0.6, "trail_m": 0.03},
-    "caster-trail": {"loss": 0.6, "trail_m": 0.03},
+    "caster-trail": {"loss": 0.6, "trail_m": 0.03, "pivot_m": 0.0442},
     "clock-drift": {"rate": 0.02},
     "clock-offset": {"offset_s": 0.4},
     "command-delay": {"delay_s": 0.3},
