@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from bns.errors import HardwareError
 from bns.hardware.guard.client import Guard
 from bns.hardware.guard.line import identity
+from bns.trial.session import _named
 
 from .. import outlive
 from ..robots_on_the_line import Robot
@@ -76,3 +78,11 @@ def test_a_guard_whose_port_never_comes_back_ends_after_the_time_that_the_rig_sa
     assert time.monotonic() - began_s > 1.4
     assert [e["kind"] for e in outlive._events(tmp_path)][-1] == "gave-up"
     robot.close()
+
+
+def test_errors_name_the_port_that_was_given_and_not_the_guards_way_to_it():
+    way, port = "/tmp/g/ttyUSB0", "/dev/ttyUSB0"
+    with pytest.raises(HardwareError, match=rf"^no servo at {port} \({port}\)$"), _named(way, port):
+        raise HardwareError(f"no servo at {way} ({way})")
+    with pytest.raises(KeyError, match=way), _named(way, port):
+        raise KeyError(way)
