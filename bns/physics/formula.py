@@ -79,7 +79,12 @@ _NUMBER = re.compile(r"[A-Za-z]\d*|k_\w+")
 
 
 def formula_effect(
-    name: str, term: str, on: str, columns: Iterable[str] = (), numbers: Iterable[str] | None = None
+    name: str,
+    term: str,
+    on: str,
+    columns: Iterable[str] = (),
+    numbers: Iterable[str] | None = None,
+    of_any_size: bool = True,
 ) -> Effect:
     """The effect that adds ``term`` to the velocity ``on``.
 
@@ -87,6 +92,7 @@ def formula_effect(
         columns: names of the log's further columns, which the term may use.
         numbers: names of its numbers where a model file lists them; all names that are neither these nor could be numbers are
             columns then, to be found in whatever log the model is compared with.
+        of_any_size: as of `Parameter`; False for terms whose numbers are of the size of speeds and of shares.
 
     Raises:
         ModelError: the term does not parse, uses anything but arithmetic, `FUNCTIONS` and names, has an unknown name (the message
@@ -110,7 +116,14 @@ def formula_effect(
         stage="body",
         parameters=tuple(
             Parameter(
-                p, "1", -LARGEST, LARGEST, (-10.0, 10.0), 0.0 if p in nothing else 1.0, "of a formula", of_any_size=True
+                p,
+                "1",
+                -LARGEST,
+                LARGEST,
+                (-10.0, 10.0),
+                0.0 if p in nothing else 1.0,
+                "of a formula",
+                of_any_size=of_any_size,
             )
             for p in unknown
         ),

@@ -155,7 +155,7 @@ def patch(problem: Problem, fit: Fit, on: str, name: str = NAME) -> Formula | No
                 best = (pull**2 / size, -pull / size, cx, cy, width)
     assert best is not None
     term = f"k * {carrier}{_disc('(x - a)', '(y - b)', 'c')}"
-    effect = formula_effect(name, term, on)
+    effect = formula_effect(name, term, on, of_any_size=False)
     start = dict(zip("kabc", best[1:], strict=True))
     model = fit.model.with_active(effect, _within(effect, start))
     try:
@@ -187,7 +187,8 @@ def fitted(
     start: Mapping[str, float] | None = None,
 ) -> Formula | None:
     """The model with a term whose numbers begin at ``start`` (0), all numbers fitted; None where it cannot be calculated."""
-    effect, start = formula_effect(name, term, on, problem.predictor.tracks.extra), start or {}
+    effect = formula_effect(name, term, on, problem.predictor.tracks.extra, of_any_size=False)
+    start = start or {}
     model = _written(fit.model.with_active(effect, _within(effect, start)), term, on, name)
     try:
         added = problem.fit(model)
