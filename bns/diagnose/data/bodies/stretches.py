@@ -177,10 +177,9 @@ def stretches_of_joints(
     tracks: JointTracks,
     mechanism: Mechanism,
     joints: Sequence[str],
-    run_up_s: float = RUN_UP_S,
     began: Sequence[Array | None] | None = None,
 ) -> StretchTracks:
-    """Trials cut into stretches of some seconds; what was told ``run_up_s`` before one brings the joints to where they are.
+    """Trials cut into stretches of some seconds; what was told `RUN_UP_S` before one brings the joints to where they are.
 
     ``began`` (trials): the posture in which each began, None where that is its first set points.
 
@@ -210,7 +209,7 @@ def stretches_of_joints(
             times.append(tracks.t_s[inside])
             number.append(np.full(len(inside), len(told)))
             start = began[trial] if began else None
-            told.append(SetPoints(rows[0], rows[1][:, columns], from_s, to_s, tuple(joints), run_up_s, start))
+            told.append(SetPoints(rows[0], rows[1][:, columns], from_s, to_s, tuple(joints), began=start))
             of.append(trial)
     if not told:
         raise DataError(f"No trial lasts {RUN_UP_S + _LASTS_S:g} s, for a stretch and the time before it; give longer trials.")
