@@ -51,8 +51,6 @@ class Parameter:
     """x or y: a place, plausible as far from the area where the robot was seen as that is long (its diagonal)."""
     trial_share: float = 0.0
     """Upper bound of a time, as a fraction of the longest trial; 0: no such bound."""
-    speed_share: float = 0.0
-    """Upper bound of a speed, in fastest speeds that a wheel was told; 0: no such bound."""
     reached: tuple[float, ...] = ()
     """Bounds at which a fit may end, because real robots reach them: the strength of a servo without torque."""
     resolution: float = 0.0
@@ -113,14 +111,6 @@ class Parameter:
         if not self.trial_share:
             return self
         high = min(self.high, max(self.trial_share * longest_s, 4.0 * self.low))
-        low, most = (min(end, high) for end in self.plausible)
-        return replace(self, high=high, plausible=(low, most), neutral=min(self.neutral, high))
-
-    def told(self, fastest_m_s: float) -> Parameter:
-        """The parameter, bounded to its `speed_share` of the fastest speed that a wheel was told."""
-        if not self.speed_share:
-            return self
-        high = min(self.high, max(self.speed_share * fastest_m_s, 4.0 * self.low))
         low, most = (min(end, high) for end in self.plausible)
         return replace(self, high=high, plausible=(low, most), neutral=min(self.neutral, high))
 
@@ -227,14 +217,6 @@ class Effect:
         if not any(p.trial_share for p in self.parameters):
             return self
         bounded = tuple(p.lasting(longest_s) for p in self.parameters)
-        starts = [tuple(min(v, p.high) for v, p in zip(start, bounded, strict=True)) for start in self.starts]
-        return replace(self, parameters=bounded, starts=tuple(dict.fromkeys(starts)))
-
-    def told(self, fastest_m_s: float) -> Effect:
-        """The effect with ranges and start values for wheels that were told this speed at most."""
-        if not any(p.speed_share for p in self.parameters):
-            return self
-        bounded = tuple(p.told(fastest_m_s) for p in self.parameters)
         starts = [tuple(min(v, p.high) for v, p in zip(start, bounded, strict=True)) for start in self.starts]
         return replace(self, parameters=bounded, starts=tuple(dict.fromkeys(starts)))
 

@@ -57,10 +57,7 @@ def fitting(effect: Effect, model: Model, tracks: Tracks | None) -> Effect:
         return scaled
     low, high = np.quantile(tracks.pose[:, :2], [0.02, 0.98], axis=0)
     within = scaled.within(low, high)
-    if tracks.relative:
-        return within
-    fastest = max((float(np.abs(told).max(initial=0.0)) for told in (tracks.left_m_s, tracks.right_m_s)), default=0.0)
-    return (within.told(fastest) if fastest > 0.0 else within).lasting(float(tracks.own_s.max()))
+    return within if tracks.relative else within.lasting(float(tracks.own_s.max()))
 
 
 def fit_with(problem: Problem, base: Fit, effect: Effect, known: Model | None = None) -> Fit:

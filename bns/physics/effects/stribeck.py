@@ -28,15 +28,7 @@ EFFECT = Effect(
             "width_m_s", "m/s", 0.0, 1.0, (0.0, 0.15), 0.0, "speed lost by a wheel near rest", size_power=1.0
         ),
         Parameter(
-            "fade_m_s",
-            "m/s",
-            1e-3,
-            5.0,
-            (2e-3, 0.5),
-            0.05,
-            "speed at which the loss has fallen to 37 %",
-            size_power=1.0,
-            speed_share=2.0,  # a loss that hardly fades over all speeds driven is a dead zone
+            "fade_m_s", "m/s", 1e-3, 5.0, (2e-3, 0.5), 0.05, "speed at which the loss has fallen to 37 %", size_power=1.0
         ),
     ),
     equation="w = sign(u)·max(|u| - d·exp(-|u|/f), 0) for each wheel",
