@@ -24,7 +24,7 @@ from bns.diagnose.residuals.earned_terms import curve_does_better
 from bns.diagnose.residuals.together import formula_in_words, said_of
 from bns.diagnose.residuals.worst_in_words import on_many_apart, on_worst
 from bns.diagnose.residuals.worst_trials import WithoutWorst, apart, far_off, most_left_out, standing_out
-from bns.diagnose.select.equivalents import TRIED, equivalent_pairs
+from bns.diagnose.select.equivalents import TRIED, equivalent_pairs, more_numbers
 from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.diagnose.select.stepwise import FALSE_ALARM, MIN_GAIN, StepwiseSelection
 from bns.diagnose.settings import DEFAULTS
@@ -94,16 +94,20 @@ def _diagnosed(
         found = found if predicts_better_throughout(found, without) else without
     if found.fewer and isinstance(predictor, WheelPredictor):  # of a body it would take minutes
         found = replace(found, selection=search.competing(found.selection, alike=bool(found.terms)))
+    left = found.rest.any or bool(found.terms)
+    tick("longer explanations")
+    pairs = [] if left else _longer(found.selection, listed(found.selection.nominal.model, extra, predictor.tracks, barred))
+    as_short = [names for names in pairs if more_numbers(found.selection, names) <= 0]
+    competing = (*found.selection.competing_models, *as_short)
+    found = replace(found, selection=replace(found.selection, competing_models=competing))
     if isinstance(predictor, WheelPredictor):
         found = replace(found, selection=alike_in_metres(found.selection))
-    left = found.rest.any or bool(found.terms)
     said, slight = said_of(found.terms, predictor), said_of(found.slight, predictor).sentences
     formula = formula_in_words(found.formula, predictor) if not found.terms else ""
     judged = {*found.withdrawn, *found.imitating, *found.negligible}
     hint = _hint(found.selection, len(predictor.tracks), judged, left)
-    tick("longer explanations")
-    pairs = [] if left else _longer(found.selection, listed(found.selection.nominal.model, extra, predictor.tracks, barred))
-    notes = [*notes_on(found, predictor.tracks, hint, pairs, said.sentences, slight, formula)]
+    longer = [names for names in pairs if names not in as_short]
+    notes = [*notes_on(found, predictor.tracks, hint, longer, said.sentences, slight, formula)]
     verdict = _verdict(found.selection, left, hint)
     if isinstance(predictor, WheelPredictor):
         notes += _on_what_remains(found, predictor, verdict)

@@ -21,7 +21,7 @@ from bns.diagnose.select.negligible import Shift
 from bns.diagnose.select.result import SelectionResult
 from bns.diagnose.select.variants import order_of_friction, uncertain_variants
 from bns.diagnose.settings import DEFAULTS
-from bns.diagnose.values import numbers_of, ties_of, without_width
+from bns.diagnose.values import numbers_of, tied_sets, without_width
 from bns.physics.effect import Effect, Parameter
 from bns.physics.jointed.mechanism import machine
 from bns.physics.jointed.model import JointedModel
@@ -42,7 +42,13 @@ def on_effects(
     """
     names = {*selection.accepted, *(name for competitor in selection.competing_models for name in competitor)}
     known = known_effects(selection)
-    tied = {name for group in ties_of(selection) for name in group if not all(known[one].of_measuring for one in group)}
+    tied = {
+        name
+        for group in tied_sets(selection)
+        for some in group
+        for name in some
+        if not all(known[one].of_measuring for others in group for one in others)
+    }
     for name in sorted(names):
         if known[name].of_measuring:
             begun = f"{name} {'would be' if name in tied else 'is'} an error of the measurement"
@@ -157,14 +163,10 @@ def _is_time(effect: Effect, p: Parameter) -> bool:
 
 
 def on_longer(selection: SelectionResult, names: Sequence[str]) -> str:
-    """Two effects that would do what one accepted effect does; whether they have as many numbers as it has."""
-    known = known_effects(selection)
+    """Two effects that would do what one accepted effect does, with more numbers than it has."""
     gone = [name for name in selection.accepted if name not in names]
     come = [name for name in names if name not in selection.accepted]
-    lost, gained = (sum(len(known[name].parameters) for name in some) for some in (gone, come))
-    numbers = "as many numbers" if gained == lost else "fewer numbers" if gained < lost else ""
-    more = f"one more effect and {numbers}" if numbers else "one more effect"
-    return f"{' with '.join(come)} in the place of {' with '.join(gone)} would explain as much, with {more}."
+    return f"{' with '.join(come)} in the place of {' with '.join(gone)} would explain as much, with one more effect."
 
 
 def on_place(found: Outcome) -> Iterator[str]:

@@ -82,10 +82,17 @@ def without_width(low: float, high: float) -> bool:
 
 
 def ties_of(selection: SelectionResult) -> list[list[str]]:
-    """Groups of names that stand for each other: exchange one of a group for another, and the tracks are explained as well."""
-    groups: list[set[str]] = []
+    """`tied_sets` in words: of two effects that stand for one together, the names are joined by "+"."""
+    return [sorted("+".join(names) for names in group) for group in tied_sets(selection)]
+
+
+def tied_sets(selection: SelectionResult) -> list[list[tuple[str, ...]]]:
+    """Groups of what stands for each other: exchange one of a group for another, and the tracks are explained as well."""
+    groups: list[set[tuple[str, ...]]] = []
     for competitor in selection.competing_models:
-        group = set(selection.accepted) ^ set(competitor)
+        gone = tuple(name for name in selection.accepted if name not in competitor)
+        come = tuple(name for name in competitor if name not in selection.accepted)
+        group = {gone, come} if 0 < len(gone) < len(come) else {(name,) for name in (*gone, *come)}
         touching = [g for g in groups if g & group]
         groups = [g for g in groups if g not in touching] + [group.union(*touching)]
     return [sorted(g) for g in groups]

@@ -1,5 +1,7 @@
-"""Longer explanations that do the same: two effects in the place of one. They are no tie, for the shorter is to be preferred,
-but whoever mends the robot should know of them: a camera's scale that is off looks like a speed gain with a wrong wheelbase.
+"""Longer explanations that do the same: two effects in the place of one. With more numbers they are no tie, for the shorter is
+to be preferred, but whoever mends the robot should know of them: a camera's scale that is off looks like a speed gain with a
+wrong wheelbase. With no more numbers (`more_numbers`) nothing prefers the one: a Stribeck friction that hardly fades is a dead
+zone and a gain, and who counts effects only has an arbitrary answer.
 
 Which pairs might do it is read from the tracks' own sensitivities where neither effect acts; and, for what is far from linear,
 from those beside an effect that does nearly all of it alone (a dead zone, of what a Stribeck friction does). They are then
@@ -20,6 +22,8 @@ from bns.diagnose.estimate.noise import weights
 from bns.diagnose.estimate.plausibility import implausible
 from bns.diagnose.parallel import each
 from bns.diagnose.select.indistinguishable import indistinguishable
+from bns.diagnose.select.known_effects import known_effects
+from bns.diagnose.select.result import SelectionResult
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect
 from bns.physics.model import ActiveEffect, Model
@@ -60,6 +64,13 @@ def equivalent_pairs(
             if indistinguishable(tried, fit, without):
                 result.append(names)
     return result
+
+
+def more_numbers(selection: SelectionResult, names: Sequence[str]) -> int:
+    """How many numbers more the effects of that set have than the accepted ones."""
+    known = known_effects(selection)
+    count = [sum(len(known[name].parameters) for name in some) for some in (names, selection.accepted)]
+    return count[0] - count[1]
 
 
 def _completed(

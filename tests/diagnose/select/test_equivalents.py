@@ -1,17 +1,21 @@
 """Two effects that do together what one does are named; others are not."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.design.competing_models import rivals_of
 from bns.diagnose.diagnosing import diagnose
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.report.text import diagnosis_text
 from bns.diagnose.select import equivalents
 from bns.diagnose.select.equivalents import equivalent_pairs
+from bns.diagnose.values import ties_of
 from bns.physics.effects import all_effects
 from bns.physics.model import ActiveEffect
 from tests.diagnose.worlds import NOMINAL, hidden, measured
@@ -93,12 +97,39 @@ def test_one_that_does_it_alone_is_no_pair():
 
 
 @pytest.mark.slow
-def test_a_diagnosis_says_so_of_what_was_nearly_as_good_when_an_effect_was_chosen():
+def test_two_effects_with_no_more_numbers_are_a_tie():
+    """The one effect is no shorter an explanation: it has as many numbers."""
     table = measured(hidden(stribeck=STRIBECK), trials=24, seed=5, **QUIET)
     found = diagnose(WheelPredictor(tracks_of(table)), NOMINAL)
-    assert found.effects == ("stribeck",)
-    said = "dead-zone with speed-gain in the place of stribeck would explain as much, with one more effect and as many numbers."
-    assert said in found.notes
+    assert (found.verdict, found.effects) == ("tie", ("stribeck",))
+    answer = found.as_json()
+    assert answer["ties"] == [["dead-zone+speed-gain", "stribeck"]]
+    assert answer["explanations"] == [["stribeck"], ["dead-zone", "speed-gain"]]
+    assert not any("with one more effect" in note for note in found.notes)
+    (rival,) = rivals_of(found)
+    assert rival.numbers["dead-zone"]["width_m_s"]["value"] == pytest.approx(0.0082, rel=0.05)
+    assert "stribeck (or dead-zone+speed-gain)" in diagnosis_text(replace(found, verdict="unlisted"))
+
+
+@pytest.mark.parametrize(
+    ("others", "ties"),
+    [
+        ([], []),
+        ([("b", "x")], [["a", "b"]]),
+        ([("b", "c", "x")], [["a", "b+c"]]),
+        ([("b", "x"), ("c", "d", "x")], [["a", "b", "c+d"]]),
+        ([("b", "x"), ("a", "y"), ("a", "y", "z")], [["a", "b"], ["x", "y", "y+z"]]),
+        ([("x",)], [["a"]]),
+    ],
+)
+def test_what_stands_for_one_effect_together_is_one_of_its_group(others, ties):
+    assert ties_of(SimpleNamespace(accepted=("a", "x"), competing_models=tuple(others))) == ties
+
+
+@pytest.mark.parametrize(("names", "more"), [(("dead-zone", "speed-gain"), 0), (("dead-zone", "marker-offset"), 1), ((), -2)])
+def test_numbers_are_counted_not_effects(monkeypatch, names, more):
+    monkeypatch.setattr(equivalents, "known_effects", lambda _: all_effects())
+    assert equivalents.more_numbers(SimpleNamespace(accepted=("stribeck",)), names) == more
 
 
 @pytest.mark.slow
