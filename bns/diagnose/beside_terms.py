@@ -164,6 +164,6 @@ def terms_matter(errors: PairedErrors) -> bool:
     return fall_matters(errors, before, WITH_TERMS)
 
 
-def unexplained_beside(found: Established) -> Unexplained:
-    """What neither the effects nor the terms of the search explain."""
-    return unexplained(found.problem, found.fit, residual_dependence(found.problem, found.fit))
+def unexplained_beside(found: Established, far: bool) -> Unexplained:
+    """What neither the effects nor the terms of the search explain; ``far`` as of `unexplained`."""
+    return unexplained(found.problem, found.fit, residual_dependence(found.problem, found.fit), far)

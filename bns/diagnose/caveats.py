@@ -26,6 +26,7 @@ from bns.diagnose.estimate.single_wheel import single_wheel
 from bns.diagnose.outcome import Outcome
 from bns.diagnose.predict.horizons import IN_WORDS
 from bns.diagnose.predict.paired_errors import PairedErrors
+from bns.diagnose.residuals.floor_lines import what_to_look_for
 from bns.diagnose.residuals.grammar import PAST
 from bns.diagnose.residuals.outliers import FAR
 from bns.diagnose.residuals.unexplained import Unexplained
@@ -214,6 +215,8 @@ def _on_rest(rest: Unexplained, tracks: Tracks) -> Iterator[str]:
         yield rest.command_times.note
     if rest.autocorrelation is not None:
         yield rest.autocorrelation.in_words
+    if rest.lines:
+        yield what_to_look_for(rest.lines)
     if rest.outliers:
         worst = "; ".join(o.in_words for o in rest.outliers[:SHOWN])
         more = ", and so on" if len(rest.outliers) > SHOWN else ""

@@ -112,6 +112,7 @@ class Diagnosis:
             "command_times": asdict(self.rest.command_times) if self.rest.command_times else None,
             "outliers_share": {**vars(self.rest.shared), "in_words": self.rest.shared.in_words} if self.rest.shared else None,
             "outliers_place": {**vars(self.rest.place), "in_words": self.rest.place.in_words} if self.rest.place else None,
+            "floor_lines": [asdict(lines) | {"in_words": lines.in_words} for lines in self.rest.lines],
             "notes": list(self.notes),
             "calibration": numbers_of(self.calibration) if self.calibration else {},
             "wheel_sizes": {
@@ -122,10 +123,11 @@ class Diagnosis:
 
     @property
     def behaviour(self) -> tuple[str, ...]:
-        """What no effect explains, in clauses: the variable it follows most where no term stands, `moments`, terms that stand."""
+        """What no effect explains, in clauses: the variable it follows most where no term stands, lines on the floor, `moments`,
+        terms that stand."""
         terms = () if self.terms_rejected else self.terms_said or self.terms_in_words
         most = self.rest.residual_dependence[:1] if not terms else ()
-        return *(p.in_words for p in most), *self.moments, *terms
+        return *(p.in_words for p in most), *(lines.in_words for lines in self.rest.lines), *self.moments, *terms
 
     @property
     def moments(self) -> tuple[str, ...]:

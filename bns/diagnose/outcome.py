@@ -124,7 +124,7 @@ def outcome_of(searched: SelectionResult, predictor: Predictor, given: Model, ti
             lost = (*lost, *more)
         unseen = unseen and not does_better_than_more(found, stands.selection, lost)
         matters = errors is None or terms_matter(errors)
-        if unseen or (not matters and next_to.rest.any and not unexplained_beside(found).any):
+        if unseen or (not matters and next_to.rest.any and not unexplained_beside(found, bool(next_to.rest.lines)).any):
             slight = found.terms
         elif matters or next_to.rest.any:
             stands, imitating, terms, with_terms = next_to, lost, found.terms, errors

@@ -16,6 +16,7 @@ from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.paired_errors import PairedErrors
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.along_variables import ResidualDependence, residual_dependence
+from bns.diagnose.residuals.drive_scatter import far_above_noise
 from bns.diagnose.residuals.floor_field import imitating_floor
 from bns.diagnose.residuals.unexplained import Unexplained, unexplained
 from bns.diagnose.select.known_effects import known_effects
@@ -61,7 +62,8 @@ def standing_of(
         errors = errors_before_and_after(selection, given)
     tick("what is left")
     dependence = residual_dependence(selection.problem, selection.fit)
-    return Standing(selection, errors, withdrawn, dependence, unexplained(selection.problem, selection.fit, dependence))
+    rest = unexplained(selection.problem, selection.fit, dependence, far_above_noise(errors))
+    return Standing(selection, errors, withdrawn, dependence, rest)
 
 
 def may_be_neutral(selection: SelectionResult) -> str:

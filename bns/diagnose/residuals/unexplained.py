@@ -1,4 +1,5 @@
-"""What a fitted model leaves unexplained, seen in four ways: along variables, along time, in moments, at changes of command.
+"""What a fitted model leaves unexplained, seen in five ways: along variables, along time, in moments, at changes of command, and
+at lines on the floor.
 
 Each sees faults that the others miss, and each has a least size, since honest robots are not alike from trial to trial either.
 """
@@ -13,6 +14,7 @@ from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.residuals.along_variables import ResidualDependence, significant_dependence
 from bns.diagnose.residuals.autocorrelation import Autocorrelation, autocorrelations
 from bns.diagnose.residuals.command_times import CommandTimes, command_times
+from bns.diagnose.residuals.floor_lines import FloorLines, floor_lines
 from bns.diagnose.residuals.moments_share import SharedCause, shared_cause
 from bns.diagnose.residuals.outliers import Outlier, judged_windows, outliers
 from bns.diagnose.residuals.shared_place import SharedPlace, shared_place
@@ -32,19 +34,23 @@ class Unexplained:
     """What the changes of command share that such moments follow."""
     place: SharedPlace | None = None
     """Where, or when in their trials, such moments begin."""
+    lines: tuple[FloorLines, ...] = ()
+    """Lines on the floor at which wheels lose way."""
 
     @property
     def any(self) -> bool:
         """Something is."""
-        return bool(self.residual_dependence or self.autocorrelation or self.outliers or self.command_times)
+        return bool(self.residual_dependence or self.autocorrelation or self.outliers or self.command_times or self.lines)
 
 
 NOTHING = Unexplained((), None, ())
 """Nothing is left."""
 
 
-def unexplained(problem: Problem, fit: Fit, seen: Sequence[ResidualDependence]) -> Unexplained:
+def unexplained(problem: Problem, fit: Fit, seen: Sequence[ResidualDependence], far: bool = False) -> Unexplained:
     """Of the patterns ``seen`` in a fitted model, and of its innovations, what is too large and too certain to be luck.
+
+    ``far``: errors are far above tracking noise, so that lines on the floor are looked for as well.
 
     On a floor a body that touched it a little otherwise goes on otherwise: there only what swings counts as alike over time.
     """
@@ -58,6 +64,7 @@ def unexplained(problem: Problem, fit: Fit, seen: Sequence[ResidualDependence]) 
         command_times(problem, fit),
         shared,
         place,
+        floor_lines(problem, fit) if far else (),
     )
 
 

@@ -34,6 +34,28 @@ class Residuals(CommandTimes):
         "frames",
         "No shorter lags, because neighbouring frames share errors of the camera and of its clock.",
     )
+    line_z: float = setting(
+        6.0,
+        "standard errors",
+        "Lines on the floor count from here on. On 91 generated logs whose effect is not in the model the largest value over "
+        "72 directions and widths is 3.6; 4 mm lost at each joint of tiles of 0.3 m make 16, 6 mm at five seams 14.",
+    )
+    line_step_deg: float = setting(
+        1.0, "°", "Step of the directions of such lines. Over a floor's extent it is as far as a strip is wide, or less."
+    )
+    line_strip_m: float = setting(0.04, "m", f"Width of the strips at least, at first; {BY_HAND}.")
+    line_wider: int = setting(8, "strips", f"What is common to so many neighbouring strips is no line; {BY_HAND}.")
+    line_groups: int = setting(
+        30, "groups", "Groups of trials one after another that are compared; with fewer trials lines are not looked for."
+    )
+    line_levels: int = setting(
+        3, "levels", f"Commands are alike if both wheels have the same of so many levels of speed per direction; {BY_HAND}."
+    )
+    line_apart_deg: float = setting(30.0, "°", f"A second direction of lines differs at least so much; {BY_HAND}.")
+    line_seen_z: float = setting(4.5, "standard errors", "A single line is told from here on, as `correlation_z`.")
+    line_even: float = setting(0.12, "1", f"Lines are evenly spaced if none is off by more of the spacing; {BY_HAND}.")
+    line_finer: int = setting(3, "times", "How often step and width are halved about the surest direction.")
+    line_shown: int = setting(6, "lines", "Most lines that are listed in a sentence.")
     least_alike: float = setting(
         0.06,
         "correlation",

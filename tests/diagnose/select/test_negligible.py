@@ -156,7 +156,7 @@ def test_what_terms_describe_wholly_counts_only_if_it_matters(monkeypatch, matte
     monkeypatch.setattr(outcome, "terms_matter", lambda _: matters)
     for module in (standing, beside_terms):
         monkeypatch.setattr(module, "residual_dependence", lambda *_: [])
-        monkeypatch.setattr(module, "unexplained", lambda _, fit, __: NOTHING if fit == found.fit else left)
+        monkeypatch.setattr(module, "unexplained", lambda _, fit, *__: NOTHING if fit == found.fit else left)
     monkeypatch.setattr(outcome, "best_formula", lambda *_: None)
     ended = outcome.outcome_of(searched, predictor(), NOMINAL, lambda _: None)
     assert ended.selection.accepted == ("wheelbase",)
@@ -205,7 +205,7 @@ def test_what_is_below_the_noise_counts_where_a_curve_does_better_than_the_effec
     monkeypatch.setattr(outcome, "does_better_than_more", lambda *given: asked.append(given[2]) or better)
     for module in (standing, beside_terms):
         monkeypatch.setattr(module, "residual_dependence", lambda *_: [])
-        monkeypatch.setattr(module, "unexplained", lambda _, fit, __: NOTHING if fit == found.fit else left)
+        monkeypatch.setattr(module, "unexplained", lambda _, fit, *__: NOTHING if fit == found.fit else left)
     monkeypatch.setattr(outcome, "best_formula", lambda *_: None)
     ended = outcome.outcome_of(searched, predictor(), NOMINAL, lambda _: None)
     assert asked == [("wheelbase", "wheel-mismatch")]
@@ -273,7 +273,7 @@ def test_what_adds_less_than_tracking_noise_does_not_count(monkeypatch, error_m,
     """With mocked parts: the effect leaves something that no term describes; the errors are given, the noise is 1 mm."""
     searched = selected("wheelbase")
     left = replace(NOTHING, residual_dependence=("something",), outliers=outliers)
-    at = SimpleNamespace(models=[SimpleNamespace(rms_m=1.0), SimpleNamespace(rms_m=error_m)], noise_floor_m=0.001)
+    at = SimpleNamespace(models=[SimpleNamespace(rms_m=1.0), SimpleNamespace(rms_m=error_m)], noise_floor_m=0.001, windows=1)
     monkeypatch.setattr(standing, "errors_before_and_after", lambda *_: SimpleNamespace(falls=True, horizons={1.0: at}))
     monkeypatch.setattr(outcome, "sought_terms", lambda *_: None)
     for module in (standing, beside_terms):
