@@ -98,8 +98,9 @@ def _diagnosed(
     tick("longer explanations")
     pairs = [] if left else _longer(found.selection, listed(found.selection.nominal.model, extra, predictor.tracks, barred))
     as_short = [names for names in pairs if more_numbers(found.selection, names) <= 0]
-    competing = (*found.selection.competing_models, *as_short)
-    found = replace(found, selection=replace(found.selection, competing_models=competing))
+    if as_short:
+        competing = (*found.selection.competing_models, *as_short)
+        found = replace(found, selection=replace(found.selection, competing_models=competing))
     if isinstance(predictor, WheelPredictor):
         found = replace(found, selection=alike_in_metres(found.selection))
     said, slight = said_of(found.terms, predictor), said_of(found.slight, predictor).sentences
