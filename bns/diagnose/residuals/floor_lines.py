@@ -2,7 +2,7 @@
 
 A curve along a coordinate is far too wide for them, and where they are nobody knows. But a wheel that crosses one is off by about
 as much as the next wheel that crosses it, in whichever trial, with whichever command. So the floor is cut into narrow strips in
-every direction, and what single wheels moved beyond the model in one strip is compared between trials. Only what was driven
+every direction, and what single wheels moved beyond the model in one strip is compared between parts of the log. Only what was driven
 with unlike commands counts: what depends on commands is alike in one place, too, where robots always do the same there.
 
 The mean of wider strips is taken off first: what changes slowly over the floor is no line.
@@ -30,6 +30,7 @@ STEP_DEG = DEFAULTS.residuals.line_step_deg
 NARROWEST_M = DEFAULTS.residuals.line_strip_m
 WIDER = DEFAULTS.residuals.line_wider
 GROUPS = DEFAULTS.residuals.line_groups
+FRAMES = DEFAULTS.residuals.line_frames
 LEVELS = DEFAULTS.residuals.line_levels
 APART_DEG = DEFAULTS.residuals.line_apart_deg
 SEEN_Z = DEFAULTS.residuals.line_seen_z
@@ -98,15 +99,16 @@ def what_to_look_for(lines: Sequence[FloorLines]) -> str:
     """A note on lines of one direction or two: how certain they are, and what they may be."""
     sure = min(one.z for one in lines)
     return (
-        f"Trials with unlike commands have errors in common at lines on the floor ({sure:.0f} standard errors). Look there for "
-        "joints of tiles or planks, edges of mats, cables. No listed effect has such lines: drive elsewhere, or on one sheet."
+        f"Parts of the log with unlike commands have errors in common at lines on the floor ({sure:.0f} standard errors). Look "
+        "there for joints of tiles or planks, edges of mats, cables. No listed effect has such lines: drive elsewhere, or lay "
+        "one sheet over them."
     )
 
 
 def floor_lines(problem: Problem, fit: Fit) -> tuple[FloorLines, ...]:
     """The lines of one direction or of two that lie across one another, the surest first; none where nothing is certain."""
     tracks = problem.predictor.tracks
-    if not isinstance(problem.predictor, WheelPredictor) or tracks.relative or len(tracks) < GROUPS:
+    if not isinstance(problem.predictor, WheelPredictor) or tracks.relative or len(tracks.t_s) < GROUPS * FRAMES:
         return ()
     passes = _passes(problem, fit)
     if not len(passes.x):
@@ -133,7 +135,7 @@ def _passes(problem: Problem, fit: Fit) -> _Passes:
     left, right, forced_s = _commanded(tracks)
     top = max(float(np.abs(tracks.left_m_s).max()), float(np.abs(tracks.right_m_s).max()), 1e-9)
     command = np.round(left / top * LEVELS) * (2 * LEVELS + 1) + np.round(right / top * LEVELS)
-    group = tracks.trial * GROUPS // len(tracks)
+    group = np.arange(len(tracks.t_s)) * GROUPS // len(tracks.t_s)
     parts = []
     half_m = fit.model.wheelbase_m / 2.0
     for side, speed in ((1.0, left), (-1.0, right)):
@@ -159,9 +161,9 @@ def _commanded(tracks: Tracks) -> tuple[Array, Array, Array]:
 
 
 def _alike(passes: _Passes, across_rad: float, width_m: float) -> float:
-    """Standard errors of what groups of trials have in common in the same strips, with unlike commands.
+    """Standard errors of what parts of the log have in common in the same strips, with unlike commands.
 
-    Under chance groups are independent, so the products of each two are a sample of mean 0.
+    Under chance parts are independent, so the products of each two are a sample of mean 0.
     """
     along = passes.along(across_rad)
     strip = np.floor((along - along.min()) / width_m).astype(np.int64)

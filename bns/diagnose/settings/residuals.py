@@ -46,8 +46,9 @@ class Residuals(CommandTimes):
     line_strip_m: float = setting(0.04, "m", f"Width of the strips at least, at first; {BY_HAND}.")
     line_wider: int = setting(8, "strips", f"What is common to so many neighbouring strips is no line; {BY_HAND}.")
     line_groups: int = setting(
-        30, "groups", "Groups of trials one after another that are compared; with fewer trials lines are not looked for."
+        30, "parts", "Parts of the log, with as many frames each, that are compared: each two give a product."
     )
+    line_frames: int = setting(20, "frames", f"Lines are not looked for where a part has fewer; {BY_HAND}.")
     line_levels: int = setting(
         3, "levels", f"Commands are alike if both wheels have the same of so many levels of speed per direction; {BY_HAND}."
     )
