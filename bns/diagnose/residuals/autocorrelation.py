@@ -2,7 +2,8 @@
 
 Foreseen well, frames are independent. Honest motors are a little faster or slower from one command to the next, and from
 trial to trial; that is taken out first, so that it does not look like an autocorrelation: inside commands each command's mean,
-between commands each trial's.
+between commands each trial's. Where most commands last a few frames alone, as those of a joystick, pieces of a trial
+take their place.
 
 Errors of a tracker that share something with those of the frames before are no motion, and correlate as well where a filter
 takes them for independent. They add up to nothing: what they add to the way in some frames, they take away later. So a
@@ -35,6 +36,7 @@ LEAST_Z = DEFAULTS.residuals.correlation_z
 APART = DEFAULTS.residuals.ways_apart
 MOVES_Z = DEFAULTS.residuals.moves_z
 MEMORY = DEFAULTS.residuals.tracker_memory
+FEWEST = DEFAULTS.residuals.correlated_frames
 _CLIP = DEFAULTS.residuals.clip
 LONGEST = DEFAULTS.residuals.longest_period_frames
 _DIRECTIONS = ("forward", "left", "heading")
@@ -79,21 +81,32 @@ class Autocorrelation:
 
 
 def autocorrelations(problem: Problem, fit: Fit) -> list[Autocorrelation]:
-    """Every direction and time scale, the largest in proportion to its threshold first."""
+    """Every direction and time scale, the largest in proportion to its threshold first.
+
+    Where commands are short no command's mean can be taken off: what is alike there may be a drive that wanders, as one from
+    command to command, and counts only with a period.
+    """
     found, moved = [], cache(lambda: _unforeseen_ways(problem, fit))
     for index, direction in enumerate(_DIRECTIONS):
         trials = list(_by_command(problem, fit, index))
         within = [_pooled(direction, "within", lag, [_within(commands, lag) for commands in trials]) for lag in LAGS]
         found += [r for r in within if not r.significant or _moves(moved(), index, r)]
         found.append(_pooled(direction, "between", 1, [_between(commands) for commands in trials]))
-    largest, *others = sorted(found, key=lambda r: (not r.significant, -abs(r.z)))
-    if largest.significant and largest.scale == "within":
-        trials = list(_by_command(problem, fit, _DIRECTIONS.index(largest.direction)))
-        frames = _period([_pooled("", "", lag, [_within(commands, lag) for commands in trials]) for lag in range(1, LONGEST + 1)])
-        tracks = problem.predictor.tracks
-        frame_s = float(np.median(np.diff(tracks.t_s)[~tracks.is_first[1:]]))
-        largest = replace(largest, period_s=None if frames is None else frames * frame_s)
-    return [largest, *others]
+    short, period_s = _short(problem.predictor.tracks), cache(lambda direction: _period_s(problem, fit, direction))
+    ranked = sorted(found, key=lambda r: (not r.significant, -abs(r.z)))
+    while ranked[0].significant and ranked[0].scale == "within":
+        largest = replace(ranked[0], period_s=period_s(ranked[0].direction))
+        if largest.period_s is not None or largest.correlation < 0 or not short:
+            return [largest, *ranked[1:]]
+        del ranked[0]
+    return ranked
+
+
+def _period_s(problem: Problem, fit: Fit, direction: str) -> float | None:
+    """Of an oscillation in that direction; None where there is none."""
+    tracks, trials = problem.predictor.tracks, list(_by_command(problem, fit, _DIRECTIONS.index(direction)))
+    frames = _period([_pooled("", "", lag, [_within(commands, lag) for commands in trials]) for lag in range(1, LONGEST + 1)])
+    return None if frames is None else frames * float(np.median(np.diff(tracks.t_s)[~tracks.is_first[1:]]))
 
 
 def _period(correlogram: list[Autocorrelation]) -> float | None:
@@ -136,12 +149,12 @@ def _unforeseen_ways(problem: Problem, fit: Fit) -> list[Array]:
 def _moves(moved: list[Array], direction: int, found: Autocorrelation) -> bool:
     """Does the track by itself move on, or back, so many frames later?"""
     lag = found.lag
-    frames = _pooled("", "", lag, [_lagged(ways[:, direction], lag) for ways in moved if len(ways) > lag + 6])
+    frames = _pooled("", "", lag, [_lagged(ways[:, direction], lag) for ways in moved if len(ways) > lag + FEWEST])
     if found.correlation < 0:
         # further than stationary errors reach, and that not by chance
         return frames.correlation < -MEMORY and frames.z * (1 + MEMORY / frames.correlation) < -MOVES_Z
     longer = [np.concatenate([[0.0], np.cumsum(ways[:, direction])]) for ways in moved]
-    values = [way[lag:] - way[:-lag] for way in longer if len(way) > 2 * lag + APART + 6]
+    values = [way[lag:] - way[:-lag] for way in longer if len(way) > 2 * lag + APART + FEWEST]
     return frames.z > MOVES_Z or _pooled("", "", lag, [_lagged(v, lag + APART) for v in values]).z > MOVES_Z
 
 
@@ -159,22 +172,30 @@ def _by_command(problem: Problem, fit: Fit, direction: int) -> Iterator[list[Arr
 
 
 def _command(tracks: Tracks, trial: int) -> NDArray[np.int64]:
-    """Number of the command in force in each frame of a trial but its first."""
+    """Number of the command in force in each frame of a trial but its first; of pieces in their place where they are short."""
     frames = slice(tracks.first[trial] + 1, tracks.first[trial + 1])
+    if _short(tracks):
+        return np.arange(frames.stop - frames.start) // (2 * LONGEST)
     return np.searchsorted(np.cumsum(tracks.duration_s[trial]), tracks.t_s[frames] - 1e-9)
+
+
+def _short(tracks: Tracks) -> bool:
+    """Do most commands end before a correlation can be read in them? A driver who steers all the time gives one a frame."""
+    lasts_s, steps_s = tracks.duration_s[tracks.duration_s > 0], np.diff(tracks.t_s)[~tracks.is_first[1:]]
+    return bool(len(lasts_s) and len(steps_s)) and float(np.median(lasts_s)) < (min(LAGS) + FEWEST) * float(np.median(steps_s))
 
 
 def _within(commands: list[Array], lag: int) -> tuple[float, float]:
     above = below = 0.0
     for values in commands:
-        if len(values) >= lag + 6:
+        if len(values) >= lag + FEWEST:
             p, q = _products(values, lag)
             above, below = above + p, below + q
     return above, below
 
 
 def _between(commands: list[Array]) -> tuple[float, float]:
-    means = np.array([values.sum() / np.sqrt(len(values)) for values in commands if len(values) > 5])
+    means = np.array([values.sum() / np.sqrt(len(values)) for values in commands if len(values) >= FEWEST])
     return _products(means, 1) if len(means) >= 4 else (0.0, 0.0)
 
 

@@ -2,8 +2,8 @@
 
 A curve along a coordinate is far too wide for them, and where they are nobody knows. But a wheel that crosses one is off by about
 as much as the next wheel that crosses it, in whichever trial, with whichever command. So the floor is cut into narrow strips in
-every direction, and what single wheels moved beyond the model in one strip is compared between parts of the log. Only what was driven
-with unlike commands counts: what depends on commands is alike in one place, too, where robots always do the same there.
+every direction, and what single wheels moved beyond the model in one strip is compared between parts of the log. Only what was
+driven with unlike commands counts: what depends on commands is alike in one place, too, where robots always do the same there.
 
 The mean of wider strips is taken off first: what changes slowly over the floor is no line.
 """
@@ -31,6 +31,7 @@ NARROWEST_M = DEFAULTS.residuals.line_strip_m
 WIDER = DEFAULTS.residuals.line_wider
 GROUPS = DEFAULTS.residuals.line_groups
 FRAMES = DEFAULTS.residuals.line_frames
+STRIP_FRAMES = DEFAULTS.residuals.line_strip_frames
 LEVELS = DEFAULTS.residuals.line_levels
 APART_DEG = DEFAULTS.residuals.line_apart_deg
 SEEN_Z = DEFAULTS.residuals.line_seen_z
@@ -38,10 +39,7 @@ EVEN = DEFAULTS.residuals.line_even
 FINER = DEFAULTS.residuals.line_finer
 _CLIP = DEFAULTS.residuals.clip
 _SHOWN = DEFAULTS.residuals.line_shown
-_FEW = 3
-"""Strips with no more frames tell nothing."""
-_STRAIGHT_DEG = 2.0
-"""Lines that differ from a coordinate's direction by less are said to be at values of it."""
+_STRAIGHT_DEG = DEFAULTS.residuals.line_straight_deg
 
 
 @dataclass(frozen=True)
@@ -205,7 +203,7 @@ def _lines(passes: _Passes, z: float, across_rad: float, width_m: float) -> Floo
     count, sums = np.bincount(strip), np.bincount(strip, passes.off_m)
     usual = float(np.median(passes.off_m))
     scatter = np.sqrt(np.bincount(strip, (passes.off_m - usual) ** 2) / np.maximum(count, 1))
-    seen = np.where(count > _FEW, (sums - usual * count) / np.maximum(scatter * np.sqrt(count), 1e-12), 0.0)
+    seen = np.where(count >= STRIP_FRAMES, (sums - usual * count) / np.maximum(scatter * np.sqrt(count), 1e-12), 0.0)
     crossed = np.bincount(strip, passes.way_m * np.abs(np.cos(passes.heading - turned))) / width  # how often, end to end
     lost = -(sums - usual * count) / np.maximum(crossed, 1e-12)
     sign = -1.0 if seen[np.abs(seen).argmax()] < 0 else 1.0

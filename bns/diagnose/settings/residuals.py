@@ -56,12 +56,23 @@ class Residuals(CommandTimes):
     line_seen_z: float = setting(4.5, "standard errors", "A single line is told from here on, as `correlation_z`.")
     line_even: float = setting(0.12, "1", f"Lines are evenly spaced if none is off by more of the spacing; {BY_HAND}.")
     line_finer: int = setting(3, "times", "How often step and width are halved about the surest direction.")
+    line_straight_deg: float = setting(
+        2.0, "°", "Lines whose direction differs from a coordinate's by less are said to be at values of it."
+    )
+    line_strip_frames: int = setting(4, "frames", f"A strip with fewer tells nothing; {BY_HAND}.")
     line_shown: int = setting(6, "lines", "Most lines that are listed in a sentence.")
     least_alike: float = setting(
         0.06,
         "correlation",
         "Least positive autocorrelation within a command that counts: robots without a missing effect reach +0.04, for "
         "a jitter of the motors of 0.2 to 4 %.",
+    )
+    correlated_frames: int = setting(
+        6,
+        "frames",
+        f"A correlation is read where so many frames have another one that much later; {BY_HAND}. Where most commands are too "
+        "short for it at the shortest of `lags`, pieces of `longest_period_frames` take their place: eight robots "
+        "that are steered so, with the right model, reach +0.02 and -0.08, a heading that swings by 0.8 Hz +0.36.",
     )
     least_opposed: float = setting(
         0.10,

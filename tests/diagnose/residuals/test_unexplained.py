@@ -166,6 +166,26 @@ def test_a_heading_that_swings_with_a_period_has_a_rhythm(period_s):
         assert "in heading swings to and fro with a period of about 0.4 s, 2.5 Hz" in autocorrelation.in_words
 
 
+def steered(table):
+    """The same robot by a driver who gives a command a frame."""
+    return table.assign(left_m_s=table.left_m_s + 1e-6 * (np.arange(len(table)) % 2))
+
+
+@pytest.mark.parametrize("jitter", [0.002, 0.02])
+def test_motors_that_vary_have_no_rhythm_where_somebody_steers_all_the_time(jitter):
+    assert largest(steered(measured(NOMINAL, trials=30, seed=2, jitter=jitter))) is None
+
+
+@pytest.mark.parametrize("period_s", [0.4, 1.25])
+def test_a_heading_that_swings_has_a_rhythm_where_somebody_steers_all_the_time(period_s):
+    """No command lasts long enough to see it."""
+    table = steered(measured(NOMINAL, trials=30, seed=2))
+    phase = 2 * np.pi * (table.t_s + 0.37 * table.trial) / period_s
+    found = largest(table.assign(heading_rad=table.heading_rad + 0.02 * np.sin(phase)))
+    assert (found.direction, found.scale) == ("heading", "within")
+    assert found.period_s == pytest.approx(period_s, rel=0.05)
+
+
 def correlogram(r, z=100.0):
     return [Autocorrelation("", "", lag, float(value), float(z * value)) for lag, value in enumerate(r, start=1)]
 
