@@ -123,11 +123,13 @@ class Diagnosis:
 
     @property
     def behaviour(self) -> tuple[str, ...]:
-        """What no effect explains, in clauses: the variable it follows most where no term stands, lines on the floor, `moments`,
-        terms that stand."""
+        """What no effect explains, in clauses: a swing, the variable it follows most where no term stands, lines on the floor,
+        `moments`, terms that stand."""
         terms = () if self.terms_rejected else self.terms_said or self.terms_in_words
         most = self.rest.residual_dependence[:1] if not terms else ()
-        return *(p.in_words for p in most), *(lines.in_words for lines in self.rest.lines), *self.moments, *terms
+        swing = self.rest.autocorrelation.clause if self.rest.autocorrelation is not None else ""
+        lines = (one.in_words for one in self.rest.lines)
+        return *filter(None, [swing]), *(p.in_words for p in most), *lines, *self.moments, *terms
 
     @property
     def moments(self) -> tuple[str, ...]:

@@ -64,12 +64,21 @@ class Autocorrelation:
         after = f"{self.lag} frames later" if self.scale == "within" else "in the next command"
         seen = f"correlation {self.correlation:+.2f}"
         if self.period_s is not None:
-            swings = f"swings to and fro with a period of about {self.period_s:.2g} s, {1 / self.period_s:.2g} Hz"
             cause = "something oscillates that no logged variable shows, such as a load or a marker that sways"
-            return f"{motion} {swings} ({seen} {after}): {cause}."
+            return f"{motion} {self._swings} ({seen} {after}): {cause}."
         if self.correlation < 0:
             return f"{motion} is opposite {after} ({seen}): something swings back that no logged variable shows."
         return f"{motion} is alike {after} ({seen}): what causes it lasts or comes again, and no logged variable shows it."
+
+    @property
+    def clause(self) -> str:
+        """That it swings, and how fast; "" of what has no period."""
+        return f"the motion {_WORDS.get(self.direction, self.direction)} {self._swings}" if self.period_s is not None else ""
+
+    @property
+    def _swings(self) -> str:
+        assert self.period_s is not None
+        return f"swings to and fro with a period of about {self.period_s:.2g} s, {1 / self.period_s:.2g} Hz"
 
     @property
     def significant(self) -> bool:

@@ -17,7 +17,7 @@ from bns.diagnose.residuals import unexplained as rest_module
 from bns.diagnose.residuals.along_variables import SHARE, ResidualDependence, probe_effect, significant_dependence
 from bns.diagnose.residuals.autocorrelation import Autocorrelation, _moves, _period
 from bns.diagnose.residuals.outliers import FAR, TRIALS, WIDTH, _windows, moment_at, outliers
-from bns.diagnose.residuals.unexplained import NOTHING, unexplained
+from bns.diagnose.residuals.unexplained import NOTHING, Unexplained, unexplained
 from bns.physics.jointed.mechanism import Mechanism
 from bns.physics.jointed.model_files import load_body
 from tests.diagnose.worlds import FRAME_S, NOMINAL, measured
@@ -184,6 +184,10 @@ def test_a_heading_that_swings_has_a_rhythm_where_somebody_steers_all_the_time(p
     found = largest(table.assign(heading_rad=table.heading_rad + 0.02 * np.sin(phase)))
     assert (found.direction, found.scale) == ("heading", "within")
     assert found.period_s == pytest.approx(period_s, rel=0.05)
+    assert Diagnosis("unlisted", None, rest=Unexplained((), found, ())).behaviour == (found.clause,)
+    period = f"{found.period_s:.2g} s, {1 / found.period_s:.2g} Hz"
+    assert found.clause == f"the motion in heading swings to and fro with a period of about {period}"
+    assert Diagnosis("unlisted", None, rest=Unexplained((), replace(found, period_s=None), ())).behaviour == ()
 
 
 def correlogram(r, z=100.0):

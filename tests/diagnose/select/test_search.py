@@ -381,6 +381,10 @@ SEVERAL = {
     "marker_offset": {"forward_m": 0.008, "left_m": -0.006}, "motor_lag": {"tau_s": 0.12}, "speed_limit": {"max_m_s": 0.15},
     "turn_slip": {"slip_s": 0.05}, "wheel_mismatch": {"ratio": 0.97},
 }  # fmt: skip
+BESIDE = {name.replace("_", "-") for name in SEVERAL} | {
+    "acceleration-limit", "battery-sag", "camera-rotation", "clock-offset", "command-delay", "force-limit", "heading-delay",
+    "side-slip", "speed-gain", "stribeck", "tilted-camera", "understeer", "wheelbase", "yaw-bias",
+}  # fmt: skip
 
 
 @pytest.mark.slow
@@ -392,9 +396,13 @@ SEVERAL = {
     ],
 )
 def test_a_curve_that_does_better_than_the_next_effect_does_not_hide_several(seed, names):
-    """Beside three effects, one of which is wrong or another of which is missing, a curve does better than the fourth alone."""
+    """Beside three effects, one of which is wrong or another of which is missing, a curve does better than the fourth alone.
+
+    Of a third of the list: with all of it a search takes minutes.
+    """
     true = hidden(**{name: SEVERAL[name] for name in names}).arranged()
-    found = diagnosed(true, trials=40, seed=seed)
+    predictor = WheelPredictor(tracks_of(measured(true, trials=40, seed=seed)))
+    found = diagnose(predictor, NOMINAL, barred=sorted(set(all_effects()) - BESIDE))
     assert (found.verdict, set(found.effects)) == ("effects", {name.replace("_", "-") for name in names})
 
 
