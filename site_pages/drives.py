@@ -93,6 +93,7 @@ VALUES: dict[str, dict[str, float]] = {
     "turn-slip-quadratic": {"slip_s2": 0.1},
     "uneven-patch": {"x_m": 0.35, "y_m": 0.0, "radius_m": 0.12, "loss": 0.08, "apart_share": 1.0, "left_share": 2.0},
     "understeer": {"loss_s_m": 1.5},
+    "turn-asymmetry": {"share": 0.2},
     "warm-up": {"loss": 0.5, "time_s": 3.0},
     "wheel-eccentricity": {"left_share": 0.6, "right_share": -0.6, "turn_m": 0.4},
     "wheel-mismatch": {"ratio": 1.05},

@@ -50,6 +50,7 @@ ORDER = (
     "wheel-eccentricity",
     "backlash",
     "wheelbase",
+    "turn-asymmetry",
     "turn-dead-zone",
     "turn-slip",
     "turn-slip-quadratic",

@@ -208,6 +208,16 @@ class TurnSlip(Cause):
 
 
 @dataclass
+class TurnAsymmetry(Cause):
+    """Left turns are so much larger, right ones so much smaller: the two are told apart by their sign."""
+
+    share: float
+
+    def body(self, body: Body, moment: Moment) -> Body:
+        return body._replace(turn=body.turn * np.where(body.turn > 0, 1 + self.share, 1 - self.share))
+
+
+@dataclass
 class SideSlip(Cause):
     """Drifts out of the curve: to the right in a left turn."""
 
@@ -404,6 +414,7 @@ LISTED: dict[str, type[Cause]] = {
     "yaw-bias": YawBias,
     "turn-dead-zone": TurnDeadZone,
     "friction-warm-up": FrictionWarmUp,
+    "turn-asymmetry": TurnAsymmetry,
     "turn-slip": TurnSlip,
     "turn-slip-quadratic": QuadraticTurnSlip,
     "side-slip": SideSlip,

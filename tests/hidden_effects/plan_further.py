@@ -54,6 +54,7 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
     "command-truncation": ({"step_m_s": 0.02}, {"step_m_s": 0.04}),
     "reversal-pause": ({"pause_s": 0.1}, {"pause_s": 0.3}),
     "reverse-gain": ({"gain": 0.95}, {"gain": 1.12}),
+    "turn-asymmetry": ({"share": 0.025}, {"share": -0.06}),
     "dead-zone-mismatch": ({"width_m_s": 0.006, "left_share": 1.8}, {"width_m_s": 0.015, "left_share": 0.4}),
     "speed-limit-mismatch": ({"max_m_s": 0.16, "left_spare": 0.2}, {"max_m_s": 0.12, "left_spare": -1.0}),
     "turn-dead-zone": ({"width_rad_s": 0.1}, {"width_rad_s": 0.25}),

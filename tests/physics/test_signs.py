@@ -28,6 +28,7 @@ def arc(forward, to_the_right, yaw):
         ("turn-slip-quadratic", {"slip_s2": 0.3}, 0.15 * 0.7, 0.0, 1.0),
         ("side-slip", {"slip_s": 0.5}, 0.15, 0.5 * 0.15, 1.0),
         ("yaw-bias", {"rate_rad_s": 0.1}, 0.15, 0.0, 1.1),
+        ("turn-asymmetry", {"share": 0.1}, 0.15, 0.0, 1.1),
         ("wheelbase", {"factor": 1.25}, 0.15, 0.0, 0.8),
         ("speed-gain", {"gain": 1.1}, 0.165, 0.0, 1.1),
         ("speed-limit", {"max_m_s": 0.16}, 0.13, 0.0, 0.6),
@@ -39,6 +40,6 @@ def test_one_command_by_hand(effect, values, forward, to_the_right, yaw, backwar
     model = Model(wheelbase_m=BASE).with_effect(effect, **values)
     way = -1.0 if backwards else 1.0
     if backwards:  # the other way round the same circle: speeds and turning change their signs
-        forward, yaw = -forward, (0.2 - yaw if effect == "yaw-bias" else -yaw)
+        forward, yaw = -forward, ({"yaw-bias": 0.2, "turn-asymmetry": 0.2}.get(effect, 0.0) - yaw)
     poses = simulate(model, np.array([[way * LEFT]]), np.array([[way * RIGHT]]), np.array([[TIME_S]]), start=(0.0, 0.0, 0.0))
     np.testing.assert_allclose(poses[0, -1], arc(forward, to_the_right, yaw), rtol=1e-6, atol=1e-9)

@@ -40,6 +40,7 @@ def number(value, low=None, high=None, **more):
         ("motor-lag", {"tau_s": number(0.2001)}, "the motors follow their commands with a lag of 200 ms"),
         ("clock-offset", {"offset_s": number(-1.25)}, "the tracker's clock is 1.25 s behind the clock of the commands"),
         ("clock-drift", {"rate": number(0.003)}, "the tracker's clock runs 0.3 % faster than the clock of the commands"),
+        ("turn-asymmetry", {"share": number(-0.025)}, "left turns are 2.5 % smaller, and right turns larger by as much"),
         ("understeer", {"loss_s_m": number(-0.2)}, "the robot turns more the faster it drives"),
         ("mass-offset", {"lead_m_s": number(-0.002)},
          "the robot's mass lies behind its axle: it turns more when it drives forward, and less backward"),
