@@ -182,6 +182,10 @@ def test_a_sweep_in_a_model_file_that_is_missing_or_none_writes_nothing(tmp_path
         (["diagnose", "log.csv", "--modl", "khepera"], r"Did you mean --model\? All options: bns diagnose --help\n$"),
         (["query", "--cvs", "SELECT 1 -- of all"], r"there is no option --cvs\. Did you mean --csv\?"),
         (["status", "--qqqq"], r"there is no option --qqqq\. All"),
+        (
+            ["add", "log.csv", "drag", "--model", "khepera", "--term", "-u*k"],
+            r"expected one argument\. A value that begins with \"-\" is written --term=VALUE, without a space\. All options",
+        ),
         (["diagnose"], r"^bns: missing: DATA, --model\. Needed: bns diagnose DATA --model M\. All options: bns diagnose --h"),
         (["add", "log.csv"], r"Needed: bns add DATA EFFECT --output NEW\.yaml --model M\."),
     ],

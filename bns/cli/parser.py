@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 SHELLS = ("bash", "zsh", "tcsh")
+_NO_VALUE = "expected one argument"
 _MISSING = "the following arguments are required:"
 
 
@@ -67,6 +68,9 @@ class Parser(argparse.ArgumentParser):
         needed = [_written(action) for action in self._actions if action.required]
         short = f" Needed: {self.prog} {' '.join(needed)}." if needed and message.startswith(_MISSING) else ""
         said = message.replace(_MISSING, "missing:")
+        if message.endswith(_NO_VALUE):
+            option = message.removeprefix("argument ").split(":")[0].split("/")[-1]
+            said += f'. A value that begins with "-" is written {option}=VALUE, without a space'
         self.exit(2, f"bns: {said}{'' if said.endswith(('.', '?')) else '.'}{short} All options: {self.prog} --help\n")
 
     def _commands(self) -> dict[str, argparse.ArgumentParser]:

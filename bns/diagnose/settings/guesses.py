@@ -37,6 +37,7 @@ class Guesses:
         "least the first number, and with the opposite sense of rotation by at most the second one: lengths of the mean of "
         f"unit vectors, 1 where all agree, near 0 on a path that turns by a round; {BY_HAND}.",
     )
+    guess_free_shown: int = setting(12, "columns", "Most columns without an entry that a proposal lists.")
     guess_largest_m: float = setting(
         100.0,
         "m",

@@ -27,6 +27,26 @@ from bns.errors import DataError
 from tests.diagnose.logs import continuous, ros
 from tests.diagnose.worlds import BASE_M, NOMINAL, hidden, measured
 
+
+def test_what_a_proposal_leaves_over_is_listed_where_something_is_missing():
+    rows = {"zeit_ms": [0, 40, 80], "v_links": [1, 1, 1], "x_cm": [0, 1, 2], "y_cm": [0, 0, 0], "winkel": [0, 0, 0]}
+    remarks = guessed(pd.DataFrame(rows)).remarks
+    assert "Not assigned: v_links, winkel. Add an entry for each that is needed." in remarks
+    assert not any("spread over" in remark for remark in remarks)
+    whole = measured(NOMINAL, trials=3)
+    assert not any("Not assigned" in remark for remark in guessed(whole.assign(odd=1.0)).remarks)
+
+
+@pytest.mark.parametrize(("factor", "said"), [(1.0, False), (1000.0, True)])
+def test_positions_that_spread_too_far_for_metres_are_pointed_at(factor, said):
+    """Of wheels in rad/s nobody knows how far they went."""
+    table = measured(NOMINAL, trials=3)
+    seen = pd.DataFrame({"time": table.t_s, "wl": table.left_m_s / 0.02, "wr": table.right_m_s / 0.02, "yaw": table.heading_rad})
+    seen = seen.assign(X=table.x_m * factor, Y=table.y_m * factor)
+    remarks = guessed(seen).remarks
+    assert any("unless these are metres" in remark for remark in remarks) is said
+
+
 SLIPPING = hidden(turn_slip={"slip_s": 0.12})
 TURNS = [f"pose.orientation.{axis}" for axis in "xyzw"]
 PLACES = ("pose.position.x", "pose.position.y")

@@ -11,14 +11,23 @@ import pandas as pd
 import yaml
 
 from bns.diagnose.data.guess.columns import METRES_A_COUNT, RADIUS, motions_of, of_columns, rank_of_commands
-from bns.diagnose.data.guess.numbers import LENGTHS, SCALE, cut_into_trials, metres_a_unit
+from bns.diagnose.data.guess.numbers import (
+    LARGEST_M,
+    LENGTHS,
+    SCALE,
+    cut_into_trials,
+    metres_a_unit,
+    spread_of_positions,
+)
 from bns.diagnose.data.guess.topics import of_topic_columns
 from bns.diagnose.data.guess.words import rank, unit_of, words_of
 from bns.diagnose.data.mapping import FORWARD, TURN
 from bns.diagnose.data.merge_topics import of_topics
+from bns.diagnose.settings import DEFAULTS
 from bns.measurements import COMMANDS, POSE
 
 Entries = dict[str, Any]
+FREE_SHOWN = DEFAULTS.data.guess_free_shown
 METRES = "METRES"
 """Stands where the wheelbase of the robot's own controller is."""
 CONTROLLERS_BASE = (
@@ -166,7 +175,10 @@ def _apart(table: pd.DataFrame, entries: Entries) -> bool:
 
 
 def _remarks(entries: Entries, tables: Mapping[str, pd.DataFrame]) -> Iterator[str]:
-    yield from _lacks(entries)
+    gone = list(_lacks(entries))
+    yield from gone
+    if gone and (free := _free(entries, tables)):
+        yield f"Not assigned: {', '.join(free)}. Add an entry for each that is needed."
     heading = entries.get("heading_rad", {})
     if {"clockwise", "zero_deg"} & set(heading):
         yield "How the heading is counted is guessed from where the robot drove: check it."
@@ -176,6 +188,10 @@ def _remarks(entries: Entries, tables: Mapping[str, pd.DataFrame]) -> Iterator[s
     place = entries.get("x_m", {})
     if place.get("unit") in LENGTHS and unit_of(words_of(str(place["from"]))) is None:
         yield f"That the positions are in {place['unit']} is guessed from how far the robot went: check it."
+    if "x_m" in entries and not {"unit", "scale"} & set(place):
+        far = [spread for table in tables.values() if (spread := spread_of_positions(table, entries)) is not None]
+        if far and max(far) > LARGEST_M:
+            yield f"The positions spread over {max(far):.0f}: unless these are metres, give x_m and y_m their unit (mm, cm)."
     told = _names_of(entries, (*COMMANDS, FORWARD, TURN))
     if told and rank_of_commands(entries) < 0:
         yield "The speeds are measured, not commanded: effects of motors and controller (lag, limits) cannot show."
@@ -186,6 +202,14 @@ def _remarks(entries: Entries, tables: Mapping[str, pd.DataFrame]) -> Iterator[s
         yield "These poses are the robot's own odometry: they agree with its wheels whatever it does. Use poses of a tracker."
     if any(str(c).startswith("column_") for table in tables.values() for c in table.columns):
         yield "Columns without a heading are called column_1, column_2, ...; assign each."
+
+
+def _free(entries: Entries, tables: Mapping[str, pd.DataFrame]) -> list[str]:
+    """Columns that no entry takes."""
+    taken: set[str] = set()
+    for entry in entries.values():
+        taken.update([entry["from"]] if isinstance(entry["from"], str) else map(str, entry["from"]))
+    return [str(c) for table in tables.values() for c in table.columns if str(c) not in taken][:FREE_SHOWN]
 
 
 def _has_all(table: pd.DataFrame, entries: Entries) -> bool:

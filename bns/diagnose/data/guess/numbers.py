@@ -18,7 +18,7 @@ SCALE = "SCALE_M_S"
 _SPEEDS = {name: SIZES[name] for name in ("m/s", "cm/s", "mm/s")}
 LENGTHS = {name: SIZES[name] for name in ("cm", "mm")}
 _WITHIN = DEFAULTS.data.guess_speed_within
-_LARGEST_M = DEFAULTS.data.guess_largest_m
+LARGEST_M = DEFAULTS.data.guess_largest_m
 _WINDOW_S = DEFAULTS.data.guess_window_s
 _AGREE, _DISAGREE = DEFAULTS.data.guess_headings
 _STANDING, _GAP, _LASTING = DEFAULTS.data.guess_cuts
@@ -99,6 +99,16 @@ def _clear_gaps(between: np.ndarray) -> float | None:
     return _GAP if lasts[at] < _GAP else float(f"{np.sqrt(lasts[at] * lasts[at + 1]):.2g}")
 
 
+def spread_of_positions(table: pd.DataFrame, entries: Mapping[str, Any]) -> float | None:
+    """How far apart the positions are, as they stand in the table; None where it has none."""
+    names = [entries[name]["from"] for name in ("x_m", "y_m") if name in entries]
+    if len(names) < 2 or any(not isinstance(name, str) or name not in table for name in names):
+        return None
+    numbers = np.array([pd.to_numeric(table[name], errors="coerce").to_numpy(float) for name in names])
+    seen = numbers[:, np.isfinite(numbers).all(axis=0)]
+    return float(np.ptp(seen, axis=1).max()) if seen.size else None
+
+
 def metres_a_unit(table: pd.DataFrame, entries: Mapping[str, Any], largest_m: float | None = None) -> float | None:
     """How far the robot went, over what the commands (of both wheels, or forward) add up to; None where that cannot be said.
 
@@ -110,7 +120,7 @@ def metres_a_unit(table: pd.DataFrame, entries: Mapping[str, Any], largest_m: fl
         return None
     t, x, y, *speeds = numbers
     good = np.isfinite(t) & np.isfinite(x) & np.isfinite(y)
-    largest_m = _LARGEST_M if largest_m is None else largest_m
+    largest_m = LARGEST_M if largest_m is None else largest_m
     if good.sum() < 3 or max(np.ptp(x[good]), np.ptp(y[good])) > largest_m:
         return None
     lasts = np.maximum(np.append(np.diff(t), 0.0), 0.0)
