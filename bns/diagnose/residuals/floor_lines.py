@@ -190,7 +190,7 @@ def _closer(passes: _Passes, angle: float, width: float, step: float) -> tuple[f
     for _ in range(FINER):
         step, width = step / 2.0, max(width / 2.0, NARROWEST_M / 4.0)
         angle = max((angle + k * step for k in range(-3, 4)), key=lambda one: _alike(passes, one, width))
-    return angle, width
+    return float(angle), width
 
 
 def _lines(passes: _Passes, z: float, across_rad: float, width_m: float) -> FloorLines | None:

@@ -53,6 +53,7 @@ _SHAPES = {
 }
 PATCH_SIDE = DEFAULTS.residuals.patch_side
 PATCH_RADII = DEFAULTS.residuals.patch_radii
+OWN_LEFT = DEFAULTS.residuals.formula_own_left
 _TERMS_AT_MOST = DEFAULTS.residuals.formula_terms
 
 
@@ -115,17 +116,18 @@ def _sparse(problem: Problem, fit: Fit, on: str, terms: Sequence[str]) -> Formul
     """The one to three terms that orthogonal matching pursuit takes; as many as still earn something held out."""
     from sklearn.linear_model import orthogonal_mp  # noqa: PLC0415  # slow to load
 
-    usable, columns = [], []
+    usable, columns, whole, root = [], [], [], np.sqrt(weights(fit.whitened))[:, None]
     for term in terms:
         effect = formula_effect(PROBE, f"k * {term}", on)
         try:
             columns.append(_column(problem, fit, effect))
+            whole.append(float(np.linalg.norm(columns[-1] * root)))
         except ModelError:
             continue  # a pole on these trials
         usable.append(term)
     matrix = np.stack([_weighted(fit, c) for c in columns], axis=1)
     size = np.linalg.norm(matrix, axis=0)
-    keep = size > 1e-9 * size.max()
+    keep = size > np.maximum(1e-9 * size.max(), OWN_LEFT * np.array(whole))  # else a number of the model's does the same
     matrix, usable = matrix[:, keep] / size[keep], [t for t, k in zip(usable, keep, strict=True) if k]
     target, best = -_weighted(fit, fit.whitened), None
     for most in range(1, min(_TERMS_AT_MOST, len(usable)) + 1):

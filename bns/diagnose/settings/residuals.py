@@ -359,6 +359,12 @@ class Residuals(CommandTimes):
     patch_radii: tuple[float, ...] = setting(
         (0.06, 0.12, 0.2, 0.3), "of the floor's diagonal", f"Radii with which a patch is first searched for; {BY_HAND}."
     )
+    formula_own_left: float = setting(
+        0.02,
+        "1",
+        "A term is no part of a formula if the model's own numbers do all but this fraction of what it does: beside a "
+        f"wheelbase, a gain of the turn rate may be anything; {BY_HAND}.",
+    )
     formula_terms: int = setting(
         3, "terms", f"Largest number of terms of a formula, which should be short enough to be read; {BY_HAND}."
     )

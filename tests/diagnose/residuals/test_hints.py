@@ -4,6 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+from sklearn import linear_model
 
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.estimate.problem import problem_for
@@ -46,6 +47,19 @@ def test_a_term_of_which_one_number_is_certain_is_one(chosen):
     found = chosen(both=1.0)
     assert found.certain
     assert found.values["k0"] == pytest.approx(-0.04, abs=0.01)
+
+
+def test_what_a_number_of_the_model_does_already_is_no_term(monkeypatch):
+    """A gain of turns beside a wheelbase: both together may be anything."""
+    true = hidden(wheelbase={"factor": 1.08}, turn_dead_zone={"width_rad_s": 0.05})
+    problem = problem_for(WheelPredictor(tracks_of(measured(true))), NOMINAL)
+    offered, pursuit = [], linear_model.orthogonal_mp
+    monkeypatch.setattr(linear_model, "orthogonal_mp", lambda m, *a, **k: offered.append(m.shape[1]) or pursuit(m, *a, **k))
+    for model, terms in ((NOMINAL, 2), (NOMINAL.with_effect("wheelbase", factor=1.08), 1)):
+        found = symbolic._sparse(problem, problem.fit(model), "w", ["w", "moving * sign(w)"])
+        assert set(offered) == {terms}
+        offered.clear()
+    assert found.term == "k0 * moving * sign(w)"
 
 
 def test_what_earns_nothing_is_none(chosen):
