@@ -120,7 +120,7 @@ def floor_lines(problem: Problem, fit: Fit) -> tuple[FloorLines, ...]:
         if z < LEAST_Z or len(found) == 2:
             break
         if all(_between(angle, one.across_rad) > math.radians(APART_DEG) for one in found):
-            lines = _lines(passes, z, *_closer(passes, angle, width, step))
+            lines = _lines(passes, z, _closer(passes, angle, width, step), width / 2.0)
             found += [lines] if lines is not None else []
     return tuple(found)
 
@@ -132,7 +132,8 @@ def _passes(problem: Problem, fit: Fit) -> _Passes:
     heading = before[:, 2] + np.angle(np.exp(1j * (tracks.pose[:, 2] - before[:, 2]))) / 2.0
     left, right, forced_s = _commanded(tracks)
     top = max(float(np.abs(tracks.left_m_s).max()), float(np.abs(tracks.right_m_s).max()), 1e-9)
-    command = np.round(left / top * LEVELS) * (2 * LEVELS + 1) + np.round(right / top * LEVELS)
+    slower, faster = np.sort(np.round(np.abs([left, right]) / top * LEVELS), axis=0)  # mirrored and reversed is alike
+    command = (slower * (LEVELS + 1) + faster) * 2 + (left * right < 0)
     group = np.arange(len(tracks.t_s)) * GROUPS // len(tracks.t_s)
     parts = []
     half_m = fit.model.wheelbase_m / 2.0
@@ -169,8 +170,7 @@ def _alike(passes: _Passes, across_rad: float, width_m: float) -> float:
     mean = np.bincount(wide, passes.moved) / np.maximum(np.bincount(wide), 1)
     moved = passes.moved - mean[wide]
     shared = _products(passes.group, strip, moved)
-    levels = (2 * LEVELS + 1) ** 2
-    like = _products(passes.group, strip * levels + passes.command + levels // 2, moved)
+    like = _products(passes.group, strip * 2 * (LEVELS + 1) ** 2 + passes.command, moved)
     products = (shared - like)[np.triu_indices(GROUPS, 1)]
     size = float(np.sqrt((products**2).sum()))
     return float(products.sum()) / size if size > 0 else 0.0
@@ -185,20 +185,20 @@ def _products(group: NDArray[np.int64], cell: NDArray[np.int64], values: Array) 
     return np.asarray((sums @ sums.T).toarray())
 
 
-def _closer(passes: _Passes, angle: float, width: float, step: float) -> tuple[float, float]:
-    """The direction in which narrower strips have the most in common, in ever smaller steps, and their width."""
+def _closer(passes: _Passes, angle: float, width: float, step: float) -> float:
+    """The direction in which narrower strips have the most in common, in ever smaller steps."""
     for _ in range(FINER):
         step, width = step / 2.0, max(width / 2.0, NARROWEST_M / 4.0)
         angle = max((angle + k * step for k in range(-3, 4)), key=lambda one: _alike(passes, one, width))
-    return float(angle), width
+    return float(angle)
 
 
-def _lines(passes: _Passes, z: float, across_rad: float, width_m: float) -> FloorLines | None:
+def _lines(passes: _Passes, z: float, across_rad: float, width: float) -> FloorLines | None:
     """Where the strips are in which wheels certainly move otherwise than in those around; None where none is certain alone."""
     turned = across_rad % math.pi
     turned -= math.pi if math.degrees(turned) > 90.0 + _STRAIGHT_DEG else 0.0
     along = passes.along(turned)
-    first, width = float(along.min()), width_m / 2.0
+    first = float(along.min())
     strip = np.floor((along - first) / width).astype(np.int64)
     count, sums = np.bincount(strip), np.bincount(strip, passes.off_m)
     usual = float(np.median(passes.off_m))

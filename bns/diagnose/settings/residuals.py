@@ -50,7 +50,9 @@ class Residuals(CommandTimes):
     )
     line_frames: int = setting(20, "frames", f"Lines are not looked for where a part has fewer; {BY_HAND}.")
     line_levels: int = setting(
-        3, "levels", f"Commands are alike if both wheels have the same of so many levels of speed per direction; {BY_HAND}."
+        3,
+        "levels",
+        f"Commands are alike if the wheels have the same of so many levels of speed, mirrored or reversed or not; {BY_HAND}.",
     )
     line_apart_deg: float = setting(30.0, "°", f"A second direction of lines differs at least so much; {BY_HAND}.")
     line_seen_z: float = setting(4.5, "standard errors", "A single line is told from here on, as `correlation_z`.")

