@@ -35,7 +35,8 @@ def found(luck="luck", **numbers):
 
 def changed(fell, after=0.5):
     """Errors that fall to a share of those of the model as given, for certain or perhaps."""
-    at = SimpleNamespace(total=SimpleNamespace(fell=fell), models=[SimpleNamespace(rms_m=1.0), SimpleNamespace(rms_m=after)])
+    models = [SimpleNamespace(rms_m=1.0), SimpleNamespace(rms_m=after)]
+    at = SimpleNamespace(windows=0, total=SimpleNamespace(fell=fell), models=models)
     return SimpleNamespace(falls=True, horizons={"stretch": at})
 
 
