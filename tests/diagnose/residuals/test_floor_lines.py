@@ -194,7 +194,7 @@ def test_runs_close_gaps_of_one():
 def test_a_diagnosis_says_where_they_are():
     found = diagnose(WheelPredictor(tracks_of(driven([(0.0, 0.25, 0.1)], 0.005))), NOMINAL)
     assert found.verdict == "unlisted"
-    assert found.effects == ()
+    assert set(found.effects) <= {"speed-gain"}  # what the lines take on the whole
     (words,) = (words for words in found.behaviour if "line on the floor" in words)
     assert "where it crosses a line on the floor, at x = " in words
     assert words.endswith("m apart")

@@ -295,7 +295,7 @@ def test_of_several_effects_only_those_that_raise_the_error_are_withdrawn(monkey
 
     def judged(selection, _):
         ratio = 0.5 + 0.6 * ("wheel-mismatch" in selection.accepted) - 0.1 * len(selection.accepted)
-        at = SimpleNamespace(models=[SimpleNamespace(rms_m=1.0), SimpleNamespace(rms_m=ratio)])
+        at = SimpleNamespace(windows=0, models=[SimpleNamespace(rms_m=1.0), SimpleNamespace(rms_m=ratio)])
         return SimpleNamespace(falls=ratio < 0.5, horizons={1.0: at})
 
     monkeypatch.setattr(standing, "errors_before_and_after", judged)
