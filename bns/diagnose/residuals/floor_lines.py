@@ -154,7 +154,7 @@ def _commanded(tracks: Tracks) -> tuple[Array, Array, Array]:
     left, right = np.zeros(len(tracks.t_s)), np.zeros(len(tracks.t_s))
     for trial in range(len(tracks)):
         frames = slice(tracks.first[trial], tracks.first[trial + 1])
-        at = np.minimum(np.searchsorted(ends[trial], tracks.own_s[frames] - 1e-9), ends.shape[1] - 1)
+        at = np.minimum(np.searchsorted(ends[trial], tracks.t_s[frames] - 1e-9), ends.shape[1] - 1)
         left[frames], right[frames] = tracks.left_m_s[trial, at], tracks.right_m_s[trial, at]
     return left, right, np.diff(tracks.t_s, prepend=tracks.t_s[:1])
 

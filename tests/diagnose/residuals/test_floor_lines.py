@@ -1,6 +1,7 @@
 """Lines on the floor at which wheels lose way are found wherever they are; what depends on commands is none."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,7 +14,7 @@ from bns.diagnose.diagnosing import diagnose
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.predict.wheels import WheelPredictor
-from bns.diagnose.residuals.floor_lines import FloorLines, _runs, _spacing, floor_lines
+from bns.diagnose.residuals.floor_lines import FloorLines, _commanded, _runs, _spacing, floor_lines
 from bns.diagnose.residuals.unexplained import NOTHING, Unexplained, unexplained
 from tests.diagnose.worlds import BASE_M, FRAME_S, NOMINAL
 
@@ -152,6 +153,15 @@ def test_few_frames_and_relative_tracks_are_not_asked(tiles):
     assert len(unexplained(problem, fit, (), far=True).lines) == 2
     tracks = SimpleNamespace(relative=True)
     assert floor_lines(SimpleNamespace(predictor=SimpleNamespace(tracks=tracks)), fit) == ()
+
+
+def test_commands_are_those_of_the_frames_where_a_trial_has_a_run_up(tiles):
+    """Times for people begin after it, the commands with it."""
+    tracks = tracks_of(tiles)
+    after = replace(tracks, lead_s=np.full(len(tracks), 2.0))
+    assert after.own_s[0] != tracks.own_s[0]
+    for given, same in zip(_commanded(after), _commanded(tracks), strict=True):
+        np.testing.assert_array_equal(given, same)
 
 
 LINES = FloorLines(0.0, (0.1, 0.4, 0.7, 1.0, 1.3, 1.6, 1.9), 0.3, 0.004, 12.0)
