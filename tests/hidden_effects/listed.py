@@ -10,12 +10,15 @@ from scipy.signal import lfilter
 from tests.hidden_effects.cause import Body, Cause, Moment
 from tests.hidden_effects.listed_braking import BrakingLag, BrakingLimit, BrakingRamp, LagMismatch
 from tests.hidden_effects.listed_floor import (
+    BASE_M,
     AffineDistortion,
     CarpetDrift,
     CasterDrag,
     CasterSwing,
     CasterTrail,
+    FloorJoints,
     FloorPatch,
+    FloorTiles,
     LensDistortion,
     QuadraticTurnSlip,
     TiltedCamera,
@@ -36,6 +39,7 @@ from tests.hidden_effects.listed_loads import (
 )
 from tests.hidden_effects.listed_motors import (
     Backlash,
+    BacklashMismatch,
     Breakaway,
     CommandQuantisation,
     CommandRate,
@@ -205,6 +209,19 @@ class TurnSlip(Cause):
 
     def body(self, body: Body, moment: Moment) -> Body:
         return body._replace(forward=body.forward * (1 - self.slip_s * np.abs(body.turn)))
+
+
+@dataclass
+class PivotSlip(Cause):
+    """Turns lose most on the spot, and less the less the inner wheel runs backwards."""
+
+    loss: float
+
+    def body(self, body: Body, moment: Moment) -> Body:
+        sides = np.sort(np.stack([body.forward - body.turn * BASE_M / 2, body.forward + body.turn * BASE_M / 2]), axis=0)
+        outer, inner = np.abs(sides).max(axis=0), np.abs(sides).min(axis=0)
+        opposite = (sides[0] < 0) & (sides[1] > 0)
+        return body._replace(turn=body.turn * (1 - self.loss * np.where(opposite, inner / np.where(outer > 0, outer, 1.0), 0.0)))
 
 
 @dataclass
@@ -407,6 +424,7 @@ LISTED: dict[str, type[Cause]] = {
     "wheel-diameters": WheelDiameters,
     "wheel-eccentricity": WheelEccentricity,
     "backlash": Backlash,
+    "backlash-mismatch": BacklashMismatch,
     "caster-swing": CasterSwing,
     "caster-trail": CasterTrail,
     "caster-drag": CasterDrag,
@@ -415,6 +433,7 @@ LISTED: dict[str, type[Cause]] = {
     "turn-dead-zone": TurnDeadZone,
     "friction-warm-up": FrictionWarmUp,
     "turn-asymmetry": TurnAsymmetry,
+    "pivot-slip": PivotSlip,
     "turn-slip": TurnSlip,
     "turn-slip-quadratic": QuadraticTurnSlip,
     "side-slip": SideSlip,
@@ -422,6 +441,8 @@ LISTED: dict[str, type[Cause]] = {
     "floor-patch": FloorPatch,
     "wheel-patch": WheelPatch,
     "uneven-patch": UnevenPatch,
+    "floor-joints": FloorJoints,
+    "floor-tiles": FloorTiles,
     "slope-load": SlopeLoad,
     "tether-load": TetherLoad,
     "floor-slope": FloorSlope,

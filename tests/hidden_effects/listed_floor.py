@@ -73,6 +73,46 @@ class UnevenPatch(WheelPatch):
 
 
 @dataclass
+class FloorJoints(Cause):
+    """Strips of the floor, one at each joint, on which a wheel gets a part of its way only; it loses the same at any angle."""
+
+    spacing_m: float
+    across_rad: float
+    at_m: float
+    loss_m: float
+    over_m: float
+    depends_on_pose = True
+
+    def place(self, body: Body, x: np.ndarray, y: np.ndarray, heading: np.ndarray) -> Body:
+        return self.held(body, x + 1j * y, heading, [(np.exp(1j * self.across_rad), self.at_m, self.loss_m)])
+
+    def held(self, body: Body, here: np.ndarray, heading: np.ndarray, rows: list[tuple[complex, float, float]]) -> Body:
+        """With the joints of several rows: direction across, where one lies, and what is lost there."""
+        ahead, sides = np.exp(1j * heading), []
+        for side in (1, -1):
+            wheel, more = here + side * 0.5j * BASE_M * ahead, 0.0
+            for across, at, loss in rows:
+                off = (wheel * np.conj(across)).real - at
+                near = np.abs(off - self.spacing_m * np.floor(off / self.spacing_m + 0.5)) < self.over_m / 2
+                more = more + near * loss / self.over_m * np.abs((ahead * np.conj(across)).real)
+            sides.append((body.forward - side * body.turn * BASE_M / 2) / (1 + more))
+        return body._replace(forward=sum(sides) / 2, turn=(sides[1] - sides[0]) / BASE_M)
+
+
+@dataclass
+class FloorTiles(FloorJoints):
+    """The same with a second row of joints across the first."""
+
+    second_at_m: float = 0.0
+    second_share: float = 0.0
+
+    def place(self, body: Body, x: np.ndarray, y: np.ndarray, heading: np.ndarray) -> Body:
+        first = np.exp(1j * self.across_rad)
+        rows = [(first, self.at_m, self.loss_m), (1j * first, self.second_at_m, self.second_share * self.loss_m)]
+        return self.held(body, x + 1j * y, heading, rows)
+
+
+@dataclass
 class QuadraticTurnSlip(Cause):
     """Turning costs forward speed, with the square of the turn rate."""
 

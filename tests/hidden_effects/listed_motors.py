@@ -265,3 +265,16 @@ class Backlash(Cause):
             tooth = np.clip(motor, 0.0, self.gap_m)
             out[:, i] = (motor - tooth) / moment.step_s
         return out
+
+
+@dataclass
+class BacklashMismatch(Cause):
+    """The same with a gap of its own on each side, of which the mean is given."""
+
+    gap_m: float
+    left_share: float
+
+    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        left = self.gap_m * self.left_share
+        sides = [Backlash(gap).wheels(wheels[..., i : i + 1], moment) for i, gap in enumerate((left, 2 * self.gap_m - left))]
+        return np.concatenate(sides, axis=-1)

@@ -19,6 +19,7 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
         {"left_share": 0.15, "right_share": 0.2, "turn_m": 0.1288},
     ),
     "backlash": ({"gap_m": 0.004}, {"gap_m": 0.01}),
+    "backlash-mismatch": ({"gap_m": 0.003, "left_share": 2.0}, {"gap_m": 0.006, "left_share": 0.3}),
     "caster-swing": ({"loss": 0.3, "trail_m": 0.03}, {"loss": 0.6, "trail_m": 0.05}),
     "caster-trail": (
         {"loss": 0.3, "trail_m": 0.015, "pivot_m": 0.0442},
@@ -49,12 +50,23 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
         {"x_m": 0.8, "y_m": 0.5, "radius_m": 0.25, "loss": 0.15, "apart_share": 1.0, "left_share": 2.0},
         {"x_m": 0.6, "y_m": 0.6, "radius_m": 0.3, "loss": 0.3, "apart_share": 1.0, "left_share": 0.4},
     ),
+    "floor-joints": (
+        {"spacing_m": 0.25, "across_rad": 0.4, "at_m": 0.1, "loss_m": 0.004, "over_m": 0.015},
+        {"spacing_m": 0.15, "across_rad": -1.2, "at_m": -0.05, "loss_m": 0.008, "over_m": 0.015},
+    ),
+    "floor-tiles": (
+        {"spacing_m": 0.3, "across_rad": 0.2, "at_m": 0.1, "loss_m": 0.004, "over_m": 0.015}
+        | {"second_at_m": 0.05, "second_share": 1.0},
+        {"spacing_m": 0.2, "across_rad": -0.6, "at_m": 0.0, "loss_m": 0.008, "over_m": 0.015}
+        | {"second_at_m": 0.1, "second_share": 0.6},
+    ),
     "command-rate": ({"period_s": 0.2}, {"period_s": 0.5}),
     "command-quantisation": ({"step_m_s": 0.02}, {"step_m_s": 0.04}),
     "command-truncation": ({"step_m_s": 0.02}, {"step_m_s": 0.04}),
     "reversal-pause": ({"pause_s": 0.1}, {"pause_s": 0.3}),
     "reverse-gain": ({"gain": 0.95}, {"gain": 1.12}),
     "turn-asymmetry": ({"share": 0.025}, {"share": -0.06}),
+    "pivot-slip": ({"loss": 0.05}, {"loss": 0.15}),
     "dead-zone-mismatch": ({"width_m_s": 0.006, "left_share": 1.8}, {"width_m_s": 0.015, "left_share": 0.4}),
     "speed-limit-mismatch": ({"max_m_s": 0.16, "left_spare": 0.2}, {"max_m_s": 0.12, "left_spare": -1.0}),
     "turn-dead-zone": ({"width_rad_s": 0.1}, {"width_rad_s": 0.25}),
@@ -123,6 +135,7 @@ ALIKE = {
     "floor-patch": ("wheel-patch", "uneven-patch"),
     "wheel-patch": ("floor-patch", "uneven-patch"),
     "uneven-patch": ("floor-patch", "wheel-patch"),
+    "floor-joints": ("floor-tiles",),
     "wheel-diameters": ("wheel-mismatch",),
     "overload-trip": ("supply-trip",),
     "supply-trip": ("overload-trip",),
@@ -130,6 +143,7 @@ ALIKE = {
 """What would stand in for an effect that is taken out: a slope is a cable from far away, and one patch contains another."""
 TURNING = {
     "backlash",
+    "backlash-mismatch",
     "braking-lag",
     "breakaway",
     "caster-drag",

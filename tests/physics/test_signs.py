@@ -29,6 +29,7 @@ def arc(forward, to_the_right, yaw):
         ("side-slip", {"slip_s": 0.5}, 0.15, 0.5 * 0.15, 1.0),
         ("yaw-bias", {"rate_rad_s": 0.1}, 0.15, 0.0, 1.1),
         ("turn-asymmetry", {"share": 0.1}, 0.15, 0.0, 1.1),
+        ("pivot-slip", {"loss": 0.5}, 0.15, 0.0, 1.0),
         ("wheelbase", {"factor": 1.25}, 0.15, 0.0, 0.8),
         ("speed-gain", {"gain": 1.1}, 0.165, 0.0, 1.1),
         ("speed-limit", {"max_m_s": 0.16}, 0.13, 0.0, 0.6),
@@ -43,3 +44,13 @@ def test_one_command_by_hand(effect, values, forward, to_the_right, yaw, backwar
         forward, yaw = -forward, ({"yaw-bias": 0.2, "turn-asymmetry": 0.2}.get(effect, 0.0) - yaw)
     poses = simulate(model, np.array([[way * LEFT]]), np.array([[way * RIGHT]]), np.array([[TIME_S]]), start=(0.0, 0.0, 0.0))
     np.testing.assert_allclose(poses[0, -1], arc(forward, to_the_right, yaw), rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "kept"),
+    [(-0.1, 0.1, 0.8), (0.1, -0.1, 0.8), (-0.05, 0.1, 0.9), (0.05, -0.1, 0.9), (0.0, 0.1, 1.0), (0.05, 0.1, 1.0)],
+)
+def test_a_turn_loses_as_far_as_the_inner_wheel_runs_against_the_outer_one(left, right, kept):
+    model = Model(wheelbase_m=BASE).with_effect("pivot-slip", loss=0.2)
+    poses = simulate(model, np.array([[left]]), np.array([[right]]), np.array([[0.5]]), start=(0.0, 0.0, 0.0))
+    assert poses[0, -1, 2] == pytest.approx(kept * (right - left) / BASE * 0.5)

@@ -98,8 +98,8 @@ def what_to_look_for(lines: Sequence[FloorLines]) -> str:
     sure = min(one.z for one in lines)
     return (
         f"Parts of the log with unlike commands have errors in common at lines on the floor ({sure:.0f} standard errors). Look "
-        "there for joints of tiles or planks, edges of mats, cables. No listed effect has such lines: drive elsewhere, or lay "
-        "one sheet over them."
+        "there for joints of tiles or planks, edges of mats, cables. Evenly spaced joints are the effects `floor-joints` and "
+        "`floor-tiles`; no listed effect has other lines: drive elsewhere, or lay one sheet over them."
     )
 
 

@@ -39,6 +39,14 @@ class Checks:
         "s",
         "A trial of more than eleven days means a wrong unit of time; its time grid would also fill the memory.",
     )
+    reckoned_share: float = setting(
+        1e-3,
+        "1",
+        "Where half of all steps from pose to pose have one ratio to what was commanded, to this share, poses look computed from "
+        "the commands. In nine logs of real robots, half of the steps are 10 to 90 % off; in 63 simulated ones with the noise of a "
+        "tracker at least 1.6 %; in one computed from its commands 0.001 %.",
+    )
+    reckoned_fewest: int = setting(20, "steps", "So many steps are needed to say that.")
     largest_number: float = setting(1e30, "1", "Larger numbers are not measurements: their squares overflow.")
     most_columns: int = setting(2_000, "columns", f"A table with more columns is not the log of a robot; {BY_HAND}.")
     longest_line: int = setting(1 << 20, "characters", f"A longer first line is not the heading of a table; {BY_HAND}.")

@@ -19,6 +19,9 @@ def number(value, low=None, high=None, **more):
     return {"value": value, "low": low, "high": high, **more}
 
 
+JOINTS = {name: number(0.01) for name in ("across_rad", "at_m", "over_m")}
+
+
 @pytest.mark.parametrize(
     ("name", "numbers", "said"),
     [
@@ -37,9 +40,28 @@ def number(value, low=None, high=None, **more):
             *("speed-limit-mismatch", {"max_m_s": number(0.1), "left_spare": number(0.3)}),
             "the right wheel runs no faster than 100 mm/s, the other one may run faster",
         ),
+        (
+            *("backlash-mismatch", {"gap_m": number(0.003), "left_share": number(0.5, 0.4, 0.6)}),
+            "play in the gears stops the right wheel for 4.5 mm of its way whenever it changes direction, and",
+        ),
+        (
+            *("backlash-mismatch", {"gap_m": number(0.003), "left_share": number(1.98, 1.9, 2.0)}),
+            "play in the gears stops the left wheel for 5.9 mm of its way whenever it changes direction, and t",
+        ),
+        (
+            "floor-joints",
+            JOINTS | {"spacing_m": number(0.3302), "loss_m": number(0.003)},
+            "a wheel loses 3 mm of its way at each of the lines on the floor that lie 0.33 m apart",
+        ),
+        (
+            "floor-tiles",
+            JOINTS | {"spacing_m": number(0.5), "loss_m": number(-0.004), "second_at_m": number(0), "second_share": number(0.5)},
+            "a wheel gains 4 mm of its way at each joint between tiles that are 0.5 m wide (2 mm at those of the second row)",
+        ),
         ("motor-lag", {"tau_s": number(0.2001)}, "the motors follow their commands with a lag of 200 ms"),
         ("clock-offset", {"offset_s": number(-1.25)}, "the tracker's clock is 1.25 s behind the clock of the commands"),
         ("clock-drift", {"rate": number(0.003)}, "the tracker's clock runs 0.3 % faster than the clock of the commands"),
+        ("pivot-slip", {"loss": number(0.07)}, "turns on the spot are 7 % smaller, and bends fit"),
         ("turn-asymmetry", {"share": number(-0.025)}, "left turns are 2.5 % smaller, and right turns larger by as much"),
         ("understeer", {"loss_s_m": number(-0.2)}, "the robot turns more the faster it drives"),
         ("mass-offset", {"lead_m_s": number(-0.002)},

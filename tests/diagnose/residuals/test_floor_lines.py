@@ -201,10 +201,19 @@ def test_runs_close_gaps_of_one():
 
 
 @pytest.mark.slow
-def test_a_diagnosis_says_where_they_are():
-    found = diagnose(WheelPredictor(tracks_of(driven([(0.0, 0.25, 0.1)], 0.005))), NOMINAL)
+def test_a_diagnosis_says_where_they_are_and_names_them_where_they_are_evenly_spaced():
+    """Two seams, 0.37 m apart and never three: their spacing is unknown; then planks."""
+    uneven = driven([(0.0, 10.0, -0.17), (0.0, 10.0, 0.2), (0.0, 10.0, 0.31)], 0.005)
+    found = diagnose(WheelPredictor(tracks_of(uneven)), NOMINAL)
     assert found.verdict == "unlisted"
     assert set(found.effects) <= {"speed-gain"}  # what the lines take on the whole
     (words,) = (words for words in found.behaviour if "line on the floor" in words)
     assert "where it crosses a line on the floor, at x = " in words
-    assert words.endswith("m apart")
+    assert not words.endswith("m apart")
+    found = diagnose(WheelPredictor(tracks_of(driven([(0.0, 0.25, 0.1)], 0.005))), NOMINAL)
+    assert (found.verdict, found.effects) == ("effects", ("floor-joints",))
+    assert not found.rest.lines
+    values = found.selection.fit.model.values_of("floor-joints")
+    assert values["spacing_m"] == pytest.approx(0.25, abs=0.001)
+    assert values["loss_m"] == pytest.approx(0.005, abs=0.0004)
+    assert (values["at_m"] - 0.1 + 0.125) % 0.25 - 0.125 == pytest.approx(0.0, abs=0.002)
