@@ -35,7 +35,11 @@ class Driven:
 
 
 class Platform(Protocol):
-    """A robot on its rig, ready to drive."""
+    """A robot on its rig, ready to drive.
+
+    It may have ``lasts_s(commands)``, too: how long a controller is expected to drive on this rig, s. Without, the robot's module
+    says.
+    """
 
     @property
     def retries(self) -> int:

@@ -195,10 +195,11 @@ class StopsAtTheEnd:
     """Whatever happens inside, the robot is stopped when it is left, and StopNotConfirmedError raised if it may still move.
 
     The fault inside stays attached as the cause. A stop that is not confirmed is said on stderr at once. `stop` must never raise.
+    ``asked``: why somebody asked for a stop, if anybody did: then the guard may have taken the port, which looks like a fault.
     """
 
-    def __init__(self, stop: Callable[[], Stop]) -> None:
-        self._stop = stop
+    def __init__(self, stop: Callable[[], Stop], asked: Callable[[], str | None] = lambda: None) -> None:
+        self._stop, self._asked = stop, asked
         self.last: Stop | None = None
 
     def __enter__(self) -> Self:
@@ -211,7 +212,8 @@ class StopsAtTheEnd:
                 return  # said already, and this attempt changes nothing
             with suppress(OSError, ValueError):  # of a terminal that is gone
                 print(f"bns: {CUT_THE_POWER}", file=sys.stderr, flush=True)  # at once: closing the rig takes seconds more
-            why = f" It was being stopped because {error}." if error is not None else ""
+            reason = self._asked() or error
+            why = f" It was being stopped because {reason}." if reason is not None else ""
             raise StopNotConfirmedError(
                 f"{CUT_THE_POWER} It did not confirm a stop for {self.last.seconds:.1f} s: {self.last.problem}.{why}"
             ) from error

@@ -25,14 +25,17 @@ from bns.hardware.servos.snake_settings import limits_of
 from bns.physics.snake.gait import GREATEST_RAD
 
 with extra("robot"):
-    from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, PacketHandler
+    from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, INST_PING, PacketHandler
 
 PROTOCOLS = (1, 2)
 _LAST_ID = 252
 _MOST_DELAY = 25
 """A return delay of 50 µs: above it, a round of twelve servos takes milliseconds longer for nothing."""
 _EEPROM_S = 0.02
+_ANSWERS_ALL = 2
 _SURE = 3
+MUTE = -1
+_MUTE = "answers a ping and nothing else (status return level 0)"
 _NAMES = {"return_delay": "return delay", "status_return": "status return level"}
 
 
@@ -53,7 +56,7 @@ def rates(protocols: Sequence[int] = PROTOCOLS, every: bool = False) -> list[Rat
 
 class OnTheBus(NamedTuple):
     """A number at which something answers; `model` is 0 where the answer is garbled, or comes twice, as by two servos of the same
-    number."""
+    number, and `MUTE` where a ping is answered and nothing else: at status return level 0 (AX-12A, control table, address 16)."""
 
     number: int
     baud: int
@@ -65,7 +68,14 @@ class OnTheBus(NamedTuple):
         """Of its model, if there is one."""
         return table_of(self.protocol, self.model)
 
+    @property
+    def mute(self) -> bool:
+        """Whether it answers a ping alone."""
+        return self.model == MUTE
+
     def __str__(self) -> str:
+        if self.mute:
+            return f"id {self.number} at {self.baud} baud: {_MUTE}; mend it with bns servos check --fix"
         if not self.model:
             return f"id {self.number} at {self.baud} baud: garbled; more than one servo has this id. Connect them one at a time"
         return f"id {self.number} at {self.baud} baud: {name_of(self.protocol, self.model)}"
@@ -110,7 +120,7 @@ class ServoBus:
             listed = "; ".join(str(servo) for servo in there) or "no servo answers"
             which = "Connect one servo alone" if old is None else f"No single servo has the id {old}"
             raise HardwareError(f"{which}: {listed}. Name one of several with --from ID.")
-        (servo,) = meant
+        (servo,) = (self.unmuted(one) if one.mute else one for one in meant)
         if any(other.number == new for other in there if other is not servo):
             raise HardwareError(f"another servo on this bus has the id {new}; take a free one, or connect one servo alone.")
         if new != servo.number:
@@ -125,7 +135,11 @@ class ServoBus:
 
     def check(self, servo: OnTheBus) -> Iterator[Finding]:
         """What of a servo's settings is not as a drive needs it."""
-        number, table, name = servo.number, servo.table, name_of(servo.protocol, servo.model)
+        number, table = servo.number, servo.table
+        if servo.mute:
+            yield Finding(False, f"servo {number} {_MUTE}", f"bns servos check --fix --port {self.port}")
+            return
+        name = name_of(servo.protocol, servo.model)
         usable = table is not None and servo.baud == BAUD
         replace_it = f"replace it; suitable are {', '.join(TABLES)}"
         at_rate = f"bns servos set-id {number} --from {number} --port {self.port}"
@@ -169,6 +183,17 @@ class ServoBus:
                 changed.append(name)
         return changed
 
+    def unmuted(self, servo: OnTheBus) -> OnTheBus:
+        """A servo that answered a ping alone, told to answer everything; HardwareError if it still does not."""
+        address, _ = AX12.span("status_return", "status_return")
+        self.at(servo.baud)
+        self._asked(lambda: (0, *self._packets[1].writeTxRx(self._line, servo.number, address, 1, [_ANSWERS_ALL])), attempts=1)
+        self._clock.sleep(_EEPROM_S)
+        found = list(self.scan([Rate(servo.baud, servo.protocol)], [servo.number]))
+        if len(found) != 1 or found[0].model in {0, MUTE}:
+            raise HardwareError(f"servo {servo.number} {_MUTE}, also after it was told to; switch it off and on.")
+        return found[0]
+
     def read(self, servo: OnTheBus, name: str) -> int:
         """A register of one servo; HardwareError if it does not answer."""
         table = servo.table or AX12
@@ -204,8 +229,15 @@ class ServoBus:
             raise HardwareError(f"servo {servo.number}: {name} is {found} after {value} was written; switch it off and on.")
 
     def _pinged(self, packets: PacketHandler, number: int) -> tuple[int, int]:
-        model, result, _ = self._asked(lambda: packets.ping(self._line, number))
-        return int(model), result
+        if packets is not self._packets[1]:
+            model, result, _ = self._asked(lambda: packets.ping(self._line, number))
+            return int(model), result
+        ping = [0, 0, number, 2, INST_PING, 0]  # the SDK's own ping reads the model as well, which some do not answer
+        _, result, _ = self._asked(lambda: packets.txRxPacket(self._line, list(ping)))
+        if result != COMM_SUCCESS:
+            return 0, result
+        model, result, _ = self._asked(lambda: packets.read2ByteTxRx(self._line, number, 0))
+        return (MUTE, COMM_SUCCESS) if result == COMM_RX_TIMEOUT else (int(model), result)
 
     def _comes_twice(self, packets: PacketHandler, number: int, again: int) -> bool:
         """Whether two servos answer; `again`: it was asked before, and the second answer may have been a late one."""

@@ -211,7 +211,8 @@ class TrialDriver:
         return driven
 
     def _lasts_s(self, controller: np.ndarray) -> float:
-        return float(self._robot.driven_ms(controller)) / 1000.0
+        here = getattr(self._platform, "lasts_s", None)  # a platform of another package may not say
+        return float(here(controller) if here is not None else self._robot.driven_ms(controller) / 1000.0)
 
     def _arm(self, purpose: _Purpose, controller: np.ndarray) -> None:
         """Before the first drive of a session somebody agrees, and has time to step back."""

@@ -61,6 +61,13 @@ def read_commands(path: Path, robot: Robot) -> list[tuple[np.ndarray, np.ndarray
             f"{path} lacks the column {', '.join(missing)}; commands of a {robot.name} need {', '.join(columns)}."
         )
     numbers = table[list(columns)].apply(pd.to_numeric, errors="coerce")
+    named = ~np.isfinite(numbers["trial"])
+    if named.any():
+        line = int(np.argmax(named))
+        raise HardwareError(
+            f"line {line + 2} of {path} has {table['trial'].iloc[line]!r} in the column trial; number the trials: they are "
+            "driven in the order of their numbers."
+        )
     good = np.isfinite(numbers).all(axis=1)
     for name, (low, high) in limits.items():
         good &= numbers[name].between(low, high)

@@ -117,7 +117,7 @@ def open_rig(how: TrialSetup, seed: int, journal: Path | None, stopping: Stoppin
         opened: Platform = module.open_platform(rig, clock, log, stopping)
         platform = opened if guard is None else GuardedPlatform(opened, guard, stopping)
         stack.callback(platform.close)
-        stack.enter_context(StopsAtTheEnd(platform.stop))
+        stack.enter_context(StopsAtTheEnd(platform.stop, lambda: stopping.reason))
         try:
             yield OpenedRig(platform, hands or _somebody(how, stopping), clock, log, plan)
         except TrialPausedError as why:

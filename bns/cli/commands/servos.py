@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from bns.hardware.clock import RealClock
 from bns.hardware.servo_setup import PROTOCOLS, Rate, ServoBus, adapter, rates
@@ -29,7 +29,7 @@ def scan(bus: ServoBus, options: argparse.Namespace) -> int:
     print(f"{len(found)} ids answer{more}" if found else f"no servo answers{more}; is the supply on, is the cable connected?")
     if found and not any(servo.model for servo in found):
         print("no answer is one of a servo: is this the port of the bus, and its rate? A line without servos may be noisy, too")
-    return 0 if found and all(servo.model for servo in found) else 2
+    return 0 if found and all(servo.model > 0 for servo in found) else 2
 
 
 def set_id(bus: ServoBus, options: argparse.Namespace) -> int:
@@ -46,6 +46,9 @@ def check(bus: ServoBus, options: argparse.Namespace) -> int:
         if not servo.model:
             print(f"BAD  {servo}")
             continue
+        if options.mend and servo.mute:
+            servo = bus.unmuted(servo)  # noqa: PLW2901
+            print(f"bns: servo {servo.number}: status_return written", file=sys.stderr)
         if options.mend and (changed := bus.mend(servo)):
             print(f"bns: servo {servo.number}: {', '.join(changed)} written", file=sys.stderr)
         for finding in bus.check(servo):
@@ -54,8 +57,20 @@ def check(bus: ServoBus, options: argparse.Namespace) -> int:
     for finding in adapter(options.port):
         bad += not finding.fine
         print(finding)
-    print("no servo answers" if not there else f"{bad} to be fixed" if bad else "all fine")
+    who = f"{len(there)} answer: {_ranges([servo.number for servo in there])}"
+    print("no servo answers" if not there else f"{bad} to be fixed; {who}" if bad else f"all fine; {who}")
     return 2 if bad else 0
+
+
+def _ranges(numbers: Sequence[int]) -> str:
+    """Ids in words, those in a row together: 1 to 4, 6."""
+    runs: list[list[int]] = []
+    for number in sorted(set(numbers)):
+        if runs and number == runs[-1][1] + 1:
+            runs[-1][1] = number
+        else:
+            runs.append([number, number])
+    return "ids " + ", ".join(str(first) if first == last else f"{first} to {last}" for first, last in runs)
 
 
 def _rates(options: argparse.Namespace, every: bool = False) -> list[Rate]:

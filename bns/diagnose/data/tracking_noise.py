@@ -18,7 +18,7 @@ import numpy as np
 
 from bns.diagnose.data.rests import settled, told_to_stand
 from bns.diagnose.data.robust import trimmed_sd
-from bns.diagnose.data.tracks import Array, Tracks
+from bns.diagnose.data.tracks import Array, Tracks, command_of_frames
 from bns.diagnose.settings import DEFAULTS
 
 FEWEST_AT_REST = DEFAULTS.data.fewest_at_rest
@@ -132,7 +132,7 @@ def _high_frequency(tracks: Tracks) -> TrackingNoise | None:
         t_s = tracks.t_s[a:b]
         if b - a < WIDTH or np.median(np.diff(t_s)) > 1 / SLOWEST_HZ:
             continue
-        command = np.searchsorted(np.cumsum(tracks.duration_s[trial]), t_s - 1e-9)
+        command = command_of_frames(tracks, trial)
         values = np.column_stack([tracks.pose[a:b, :2], np.unwrap(tracks.pose[a:b, 2])])
         held = np.append(False, (np.diff(values, axis=0) == 0).all(axis=1))
         one = command[WIDTH - 1 :] == command[: len(command) - WIDTH + 1]

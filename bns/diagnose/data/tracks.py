@@ -144,6 +144,12 @@ class Tracks:
         return np.concatenate([np.diff(count[rows], prepend=count[rows[:1]]) > 0 for rows in selected])
 
 
+def command_of_frames(tracks: Tracks, trial: int) -> NDArray[np.int64]:
+    """Number of the command that was in force before each frame of a trial, (frames,); one more than the last after its end."""
+    frames = slice(tracks.first[trial], tracks.first[trial + 1])
+    return np.searchsorted(np.cumsum(tracks.duration_s[trial]), tracks.t_s[frames] - 1e-9)
+
+
 def slimmed(tracks: Tracks) -> Tracks:
     """The tracks, thinned where they have more than `MOST_FRAMES`."""
     every = -(-len(tracks.t_s) // MOST_FRAMES)

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.data.robust import robust_sd
-from bns.diagnose.data.tracks import Array, Tracks
+from bns.diagnose.data.tracks import Array, Tracks, command_of_frames
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.residuals.unforeseen import unforeseen
@@ -182,10 +182,9 @@ def _by_command(problem: Problem, fit: Fit, direction: int) -> Iterator[list[Arr
 
 def _command(tracks: Tracks, trial: int) -> NDArray[np.int64]:
     """Number of the command in force in each frame of a trial but its first; of pieces in their place where they are short."""
-    frames = slice(tracks.first[trial] + 1, tracks.first[trial + 1])
     if _short(tracks):
-        return np.arange(frames.stop - frames.start) // (2 * LONGEST)
-    return np.searchsorted(np.cumsum(tracks.duration_s[trial]), tracks.t_s[frames] - 1e-9)
+        return np.arange(tracks.first[trial + 1] - tracks.first[trial] - 1) // (2 * LONGEST)
+    return command_of_frames(tracks, trial)[1:]
 
 
 def _short(tracks: Tracks) -> bool:

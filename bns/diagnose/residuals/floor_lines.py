@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.data.robust import robust_sd
-from bns.diagnose.data.tracks import Array, Tracks
+from bns.diagnose.data.tracks import Array, Tracks, command_of_frames
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.predict.wheels import WheelPredictor
@@ -150,11 +150,10 @@ def _passes(problem: Problem, fit: Fit) -> _Passes:
 
 def _commanded(tracks: Tracks) -> tuple[Array, Array, Array]:
     """The wheels' commanded speeds (m/s) at each frame, and the time (s) from the frame before."""
-    ends = np.cumsum(tracks.duration_s, axis=1)
     left, right = np.zeros(len(tracks.t_s)), np.zeros(len(tracks.t_s))
     for trial in range(len(tracks)):
         frames = slice(tracks.first[trial], tracks.first[trial + 1])
-        at = np.minimum(np.searchsorted(ends[trial], tracks.t_s[frames] - 1e-9), ends.shape[1] - 1)
+        at = np.minimum(command_of_frames(tracks, trial), tracks.duration_s.shape[1] - 1)
         left[frames], right[frames] = tracks.left_m_s[trial, at], tracks.right_m_s[trial, at]
     return left, right, np.diff(tracks.t_s, prepend=tracks.t_s[:1])
 

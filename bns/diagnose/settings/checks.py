@@ -43,7 +43,7 @@ class Checks:
         1e-3,
         "1",
         "Where half of all steps from pose to pose have one ratio to what was commanded, to this share, poses look computed from "
-        "the commands. In nine logs of real robots, half of the steps are 10 to 90 % off; in 63 simulated ones with the noise of a "
+        "the commands. In nine logs of real robots, half of the steps are 10 to 90 % off; in 63 simulated ones with noise of a "
         "tracker at least 1.6 %; in one computed from its commands 0.001 %.",
     )
     reckoned_fewest: int = setting(20, "steps", "So many steps are needed to say that.")

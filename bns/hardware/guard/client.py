@@ -287,6 +287,12 @@ class GuardedPlatform:
         move = self._platform.move_about  # type: ignore[attr-defined]
         return lambda seconds: self._guarded(lambda: move(seconds))
 
+    @property
+    def lasts_s(self) -> Callable[[np.ndarray], float]:
+        """How long commands are expected to take; there is none where the robot's platform has none."""
+        lasts: Callable[[np.ndarray], float] = self._platform.lasts_s  # type: ignore[attr-defined]
+        return lasts
+
     def _guarded(self, move: Callable[[], Any]) -> Any:
         self._stopping.check()
         self._guard.arm()

@@ -27,7 +27,7 @@ from bns.hardware.servos.snake_settings import SnakeSettings, snake_settings
 from bns.hardware.stop import Stop
 from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.kinds import DELAY, checked, delay_of, open_tracker
-from bns.physics.snake.gait import GREATEST_RAD
+from bns.physics.snake.gait import GREATEST_RAD, cycle_angles
 
 REPEATS = 3
 """How often a trial drives its final controller by default: the dissertation drove it three times (section 5.7)."""
@@ -49,6 +49,7 @@ class SnakePlatform:
     ) -> None:
         self._chain, self._eye, self._settings = chain, eye, settings
         self._clock, self._journal = clock, journal
+        self._asked = lambda: stopping.reason
         self._watch, self._disagree_s = Watch(rig.limits, clock, stopping), rig.limits.disagree_s
         self._unknown_s = KNOWN_S if DELAY in rig.tracker else UNKNOWN_S
 
@@ -88,17 +89,25 @@ class SnakePlatform:
         """Bend to one side and back, for the tracker's delay; stopped at the end. TrialPausedError, StopNotConfirmedError."""
         drive = self._new_drive()
         self._watch.begin()
-        with StopsAtTheEnd(self.stop):
+        with StopsAtTheEnd(self.stop, self._asked):
             try:
                 drive.straighten()
                 return bent(self._chain, self._eye, self._watch, self._settings, self._clock, seconds)
             except (ServoError, DriveEnded) as error:
                 raise TrialPausedError(f"the robot could not be bent about: {error}") from error
 
+    def lasts_s(self, commands: np.ndarray) -> float:
+        """How long cycles take here, by the joints' speed and the pause after each posture; straightening not counted."""
+        postures = [np.zeros(len(self._settings.ids))]
+        for cycle in commands.astype(np.float64):
+            postures += list(cycle_angles(cycle[:4], len(postures[0])))
+        ways_rad = np.abs(np.diff(postures, axis=0)).max(axis=1)
+        return float((ways_rad / self._settings.joint_speed_rad_s + self._settings.settle_s).sum())
+
     def drive(self, commands: np.ndarray) -> Driven:
         """Straighten the robot, then drive the cycles one after the other."""
         drive, ended = self._new_drive(), ""
-        guard, stuck = StopsAtTheEnd(self.stop), ""
+        guard, stuck = StopsAtTheEnd(self.stop, self._asked), ""
         began_s = self._clock.now_s()
         self._watch.begin()
         with guard:

@@ -86,6 +86,7 @@ class WheeledPlatform:
         self._driver, self._wheels, self._clock, self._journal = driver, wheels, clock, journal
         self._eye = Eye(tracker, clock, journal, math.pi / 2, delay_of(rig.tracker), rig.tracker["kind"])
         self._units = np.array([wheels.units_per_m_s, wheels.units_per_m_s, wheels.units_per_s])
+        self._asked = lambda: stopping.reason
         self._watch, self._disagree_s = Watch(rig.limits, clock, stopping), rig.limits.disagree_s
 
     @property
@@ -127,7 +128,7 @@ class WheeledPlatform:
         """Turn to and fro on the spot, for the tracker's delay; stopped at the end. TrialPausedError, StopNotConfirmedError."""
         if self.pose() is None:
             raise TrialPausedError(_NOT_SEEN)
-        with StopsAtTheEnd(self.stop):
+        with StopsAtTheEnd(self.stop, self._asked):
             try:
                 return turned(self._driver, self._eye, self._watch, self._clock, seconds)
             except (RobotLostError, DriveEnded) as error:
@@ -142,7 +143,7 @@ class WheeledPlatform:
         often = self._wheels.heartbeat_looks
         drive = WheelDrive(self._driver, self._eye, self._watch, agreement, self._clock, self._journal, start, often)
         ended = ""
-        guard = StopsAtTheEnd(self.stop)
+        guard = StopsAtTheEnd(self.stop, self._asked)
         began_s = self._clock.now_s()
         self._watch.begin()
         with guard:

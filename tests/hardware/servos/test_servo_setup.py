@@ -133,7 +133,7 @@ def test_check_names_what_is_not_fit_and_mends_it(bus, capsys):
     assert f"bns servos check --fix --port {port}" in said.out
     assert servos[0].get("status_return") == 1  # nothing was written
     code, said = call(capsys, "check", "--fix", "--port", port)
-    assert (code, said.out.splitlines()[-1]) == (0, "all fine")
+    assert (code, said.out.splitlines()[-1]) == (0, "all fine; 2 answer: ids 1 to 2")
     assert [s.get("return_delay") for s in servos] == [0, 0]
     assert "servo 1: status_return, return_delay, cw_angle_limit written" in said.err
 
@@ -178,3 +178,34 @@ def test_the_adapter_s_latency_timer(tmp_path):
         "BAD  /dev/ttyUSB0: latency timer 16 ms\n     try: echo 1 | sudo tee /sys/class/tty/ttyUSB0/device/latency_timer"
     )
     assert list(adapter("/dev/ttyACM0", tmp_path)) == []
+
+
+def test_a_servo_that_answers_a_ping_alone_is_named_and_mended(bus, capsys):
+    """Status return level 0 (AX-12A, control table, address 16): only a ping is answered."""
+    servos, port = bus(1, 2, 3, return_delay=0)
+    servos[1].put("status_return", 0)
+    code, said = call(capsys, "scan", "--port", port)
+    assert code == 2
+    assert "id 2 at 1000000 baud: answers a ping and nothing else (status return level 0)" in said.out
+    assert "3 ids answer" in said.out
+    code, said = call(capsys, "check", "--port", port)
+    assert code == 2
+    assert "servo 2 answers a ping and nothing else (status return level 0)" in said.out
+    assert said.out.splitlines()[-1] == "1 to be fixed; 3 answer: ids 1 to 3"
+    code, said = call(capsys, "check", "--fix", "--port", port)
+    assert "servo 2: status_return written" in said.err
+    assert (code, said.out.splitlines()[-1]) == (0, "all fine; 3 answer: ids 1 to 3")
+    assert servos[1].get("status_return") == 2
+
+
+def test_a_check_says_whom_it_looked_at(bus, capsys):
+    """Nobody has told it how many there should be."""
+    _, port = bus(1, 2, 4, 6, 7)
+    assert call(capsys, "check", "--port", port)[1].out.splitlines()[-1].endswith("5 answer: ids 1 to 2, 4, 6 to 7")
+
+
+def test_a_mute_servo_gets_its_number(bus, capsys):
+    servos, port = bus(1)
+    servos[0].put("status_return", 0)
+    assert call(capsys, "set-id", 5, "--port", port)[0] == 0
+    assert (servos[0].get("id"), servos[0].get("status_return")) == (5, 2)

@@ -68,7 +68,7 @@ def test_check_names_what_is_not_fit_and_mends_it(bus, capsys):
     for what in ("operating mode 1", "status return level 1", "return delay 500 µs", "angle limits 1100 to 4095"):
         assert f"BAD  servo 4: {what}" in said.out
     code, said = call(capsys, "check", "--fix", "--port", port)
-    assert (code, said.out.splitlines()[-1]) == (0, "all fine")
+    assert (code, said.out.splitlines()[-1]) == (0, "all fine; 1 answer: ids 4")
     assert "status_return, return_delay, operating_mode, cw_angle_limit written" in said.err
     servo.put("present_voltage", 74)  # a battery of two cells
     assert call(capsys, "check", "--port", port)[0] == 0

@@ -120,3 +120,38 @@ def test_a_snake_that_stays_where_it_cannot_be_pauses_the_trial(rigged, monkeypa
     with pytest.raises(TrialPausedError, match=r"seen where it cannot have moved to for 0\.\d s.*was it carried"):
         on.platform.drive(np.array([GENTLE] * 3, np.float32))
     assert not any(servo.get("torque_enable") for servo in on.emulation.servos)
+
+
+def exchanging(monkeypatch, which):
+    """The camera takes each marker for the other in every sight of a robot on its way whose number is in `which`."""
+    good, seen, moving = FrameTracker.look, [], []
+
+    def look(self):
+        sight = good(self)
+        if sight is None:
+            return None
+        seen.append(sight.pose[:2])
+        if np.hypot(*(seen[-1] - seen[0])) > 0.03:
+            moving.append(sight.t_s)
+        if len(set(moving)) not in which:
+            return sight
+        points = dict(zip(sight.points, reversed(sight.points.values()), strict=True))
+        return Sight(sight.t_s, sight.pose + np.array([0.0, 0.0, np.pi]), sight.residual_m, points)
+
+    monkeypatch.setattr(FrameTracker, "look", look)
+
+
+def test_a_cycle_of_a_snake_whose_markers_change_places_once_is_not_stable(rigged, monkeypatch):  # noqa: F811
+    on = rigged()
+    exchanging(monkeypatch, {4})
+    driven = on.platform.drive(np.array([GENTLE, GENTLE], np.float32))
+    assert driven.leaps == 1
+    assert driven.poses[:, 8].tolist() == [1.0, 0.0, 1.0]
+
+
+def test_markers_that_stay_exchanged_pause_the_trial(rigged, monkeypatch):  # noqa: F811
+    on = rigged()
+    exchanging(monkeypatch, set(range(4, 1000)))
+    with pytest.raises(TrialPausedError, match=r"seen where it cannot have moved to for 0\.\d s"):
+        on.platform.drive(np.array([GENTLE] * 3, np.float32))
+    assert not any(servo.get("torque_enable") for servo in on.emulation.servos)

@@ -94,6 +94,15 @@ def test_a_stop_not_confirmed_is_louder_than_any_fault(fault):
     assert ("It was being stopped because" in str(caught.value)) == (fault is not None)
 
 
+def test_who_asked_for_the_stop_is_named_and_not_the_silence_of_a_port_that_the_guard_has_taken():
+    def inside():
+        with StopsAtTheEnd(lambda: Stop(False, 5.0, None, "the port is gone"), lambda: "interrupted"):
+            raise RuntimeError("servo 2 does not answer")
+
+    with pytest.raises(StopNotConfirmedError, match=r"It was being stopped because interrupted\.$"):
+        inside()
+
+
 def test_a_robot_that_is_not_seen_to_stand_is_cried_out_at_once_and_once(capsys):
     """The second attempt, when the rig is closed, takes five seconds more; nobody may wait for it to hear the first."""
     heard = []

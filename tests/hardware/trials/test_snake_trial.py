@@ -70,6 +70,14 @@ def test_the_camera_sees_the_robot_everywhere_on_the_surface(rigged, x, y, headi
     assert np.cos(seen[2] - heading) > np.cos(0.02)
 
 
+@pytest.mark.parametrize("joint_speed_rad_s", [1.0, 2.5])
+def test_how_long_a_drive_takes_is_announced_by_the_joints_speed(rigged, joint_speed_rad_s):
+    on, cycles = rigged(joint_speed_rad_s=joint_speed_rad_s), np.array([GENTLE, GENTLE], np.float32)
+    announced_s = on.platform.lasts_s(cycles)
+    spans = on.platform.drive(cycles).spans_s
+    assert announced_s == pytest.approx(spans[-1][1] - spans[0][0], rel=0.15)
+
+
 @pytest.mark.parametrize("wiring", ["bus", "bridge"])
 def test_an_emulated_drive_is_that_of_the_physics_model(rigged, wiring):
     on = rigged(wiring=wiring)
@@ -292,6 +300,7 @@ def test_given_cycles_are_driven_and_held_against_a_model(tmp_path, capsys):
     ("row", "message"),
     [
         ("1,0.5,0.1,0.6", "lacks the column alpha_rad"),
+        ("a,0.5,0.1,0.6,0.7", "line 2 of .* has 'a' in the column trial; number the trials"),
         ("1,0.5,0.1,0.6,9", "line 2 of .* is no command of a snake; allowed is a_lat_rad 0 to 1.571"),
         ("1,0.5,0.6,0.6,0", "a_vert_rad must be below its a_lat_rad"),
     ],
