@@ -75,7 +75,7 @@ class OnTheBus(NamedTuple):
 
     def __str__(self) -> str:
         if self.mute:
-            return f"id {self.number} at {self.baud} baud: {_MUTE}; mend it with bns servos check --fix"
+            return f"id {self.number} at {self.baud} baud: {_MUTE}; bns servos check --fix corrects it"
         if not self.model:
             return f"id {self.number} at {self.baud} baud: garbled; more than one servo has this id. Connect them one at a time"
         return f"id {self.number} at {self.baud} baud: {name_of(self.protocol, self.model)}"
