@@ -54,11 +54,17 @@ def folds(tracks: Tracks) -> NDArray[np.int64]:
 
     Pieces of one trial share what was peculiar to it, so that they are held out together; those of a single one in five blocks.
     """
-    each_one = np.arange(len(tracks))
     if tracks.lead_s is None:
-        return each_one % min(FOLDS, len(tracks))
-    of = np.cumsum(np.append(True, tracks.lead_s[1:] <= 0.0)) - 1
-    return of % FOLDS if of[-1] > 0 else each_one * min(FOLDS, len(tracks)) // len(tracks)
+        return np.arange(len(tracks)) % min(FOLDS, len(tracks))
+    of = whole_trials(tracks)
+    return of % FOLDS if of[-1] > 0 else np.arange(len(tracks)) * min(FOLDS, len(tracks)) // len(tracks)
+
+
+def whole_trials(tracks: Tracks) -> NDArray[np.int64]:
+    """Number of the trial that each is, or is a piece of, (trials,)."""
+    if tracks.lead_s is None:
+        return np.arange(len(tracks))
+    return np.cumsum(np.append(True, tracks.lead_s[1:] <= 0.0)) - 1
 
 
 @dataclass(frozen=True)

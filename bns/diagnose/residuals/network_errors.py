@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.data.tracks import Array
-from bns.diagnose.estimate.cross_validation import FOLDS
+from bns.diagnose.estimate.cross_validation import FOLDS, whole_trials
 from bns.diagnose.estimate.significance import sign_flip_p
 from bns.diagnose.predict.networks import NetworkPredictor
 from bns.diagnose.residuals.missing_inputs import Commands, MissingInput, find_missing_inputs
@@ -179,7 +179,9 @@ def _commands(predictor: NetworkPredictor) -> tuple[Array, Commands]:
     }
     variables["heading_rad"] = variables["heading_rad"] + told[:, 2] / 2  # halfway through the command
     variables |= {name: values[row] for name, values in _kept(predictor, lists).items()}
-    commands = Commands(trial, duration, _outputs(predictor, told), _outputs(predictor, error), variables)
+    whole = whole_trials(tracks)  # pieces of one trial share what was peculiar to it
+    own = whole[trial] if whole[-1] > 0 else trial
+    commands = Commands(own, duration, _outputs(predictor, told), _outputs(predictor, error), variables)
     return inputs[row], commands
 
 

@@ -1,6 +1,7 @@
 """Networks that are wrong for a planted reason: thin data, an effect that no input tells of, both, neither."""
 
 import json
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -10,7 +11,7 @@ from bns.cli.main import main
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.predict.networks import NetworkPredictor
 from bns.diagnose.residuals.missing_inputs import Commands, find_missing_inputs
-from bns.diagnose.residuals.network_errors import nearness, why_wrong
+from bns.diagnose.residuals.network_errors import _commands, nearness, why_wrong
 from bns.engine.philox import Key
 from bns.engine.rprop import Rprop
 from bns.engine.snn import initial_weights
@@ -138,3 +139,17 @@ def test_a_planted_variable_is_found_with_its_share_and_luck_is_not():
     assert share == pytest.approx(16 / 12 / (16 / 12 + 1), abs=0.08)
     for seed in range(5):
         assert find_missing_inputs(drifting(seed, 0.0))[0] == []
+
+
+@pytest.mark.parametrize(
+    ("lead_s", "expected"),
+    [
+        (None, [0, 1, 2, 3, 4, 5]),
+        ([0.0, 2.0, 2.0, 0.0, 2.0, 0.0], [0, 0, 0, 1, 1, 2]),
+        ([0.0, 2.0, 2.0, 2.0, 2.0, 2.0], [0, 1, 2, 3, 4, 5]),  # of a single one there is nothing else to compare
+    ],
+)
+def test_commands_of_pieces_of_one_trial_belong_together(lead_s, expected):
+    tracks = replace(tracks_of(driven("plain", 6, 1)), lead_s=None if lead_s is None else np.array(lead_s))
+    _, commands = _commands(NetworkPredictor(tracks, trained("plain"), ROBOT))
+    assert commands.trial.tolist() == np.repeat(expected, COMMANDS).tolist()
