@@ -50,6 +50,7 @@ ORDER = (
     "wheel-eccentricity",
     "backlash",
     "backlash-mismatch",
+    "backlash-start",
     "wheelbase",
     "turn-asymmetry",
     "pivot-slip",

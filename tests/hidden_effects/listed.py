@@ -40,6 +40,7 @@ from tests.hidden_effects.listed_loads import (
 from tests.hidden_effects.listed_motors import (
     Backlash,
     BacklashMismatch,
+    BacklashStart,
     Breakaway,
     CommandQuantisation,
     CommandRate,
@@ -425,6 +426,7 @@ LISTED: dict[str, type[Cause]] = {
     "wheel-eccentricity": WheelEccentricity,
     "backlash": Backlash,
     "backlash-mismatch": BacklashMismatch,
+    "backlash-start": BacklashStart,
     "caster-swing": CasterSwing,
     "caster-trail": CasterTrail,
     "caster-drag": CasterDrag,

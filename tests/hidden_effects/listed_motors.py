@@ -257,9 +257,14 @@ class Backlash(Cause):
 
     gap_m: float
 
+    @property
+    def first_m(self) -> float:
+        """How much of it lies behind when a trial begins."""
+        return self.gap_m
+
     def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
         out = np.zeros_like(wheels)
-        tooth = np.full_like(wheels[:, 0], self.gap_m)  # where in the gap the motor's tooth is: 0 or gap_m drives
+        tooth = np.full_like(wheels[:, 0], self.first_m)  # where in the gap the motor's tooth is: 0 or gap_m drives
         for i in range(wheels.shape[1]):
             motor = tooth + wheels[:, i] * moment.step_s
             tooth = np.clip(motor, 0.0, self.gap_m)
@@ -278,3 +283,14 @@ class BacklashMismatch(Cause):
         left = self.gap_m * self.left_share
         sides = [Backlash(gap).wheels(wheels[..., i : i + 1], moment) for i, gap in enumerate((left, 2 * self.gap_m - left))]
         return np.concatenate(sides, axis=-1)
+
+
+@dataclass
+class BacklashStart(Backlash):
+    """The same, begun elsewhere in the gap."""
+
+    crossed_share: float
+
+    @property
+    def first_m(self) -> float:
+        return self.crossed_share * self.gap_m

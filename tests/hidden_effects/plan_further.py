@@ -19,6 +19,7 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
         {"left_share": 0.15, "right_share": 0.2, "turn_m": 0.1288},
     ),
     "backlash": ({"gap_m": 0.004}, {"gap_m": 0.01}),
+    "backlash-start": ({"gap_m": 0.004, "crossed_share": 0.0}, {"gap_m": 0.01, "crossed_share": 0.5}),
     "backlash-mismatch": ({"gap_m": 0.003, "left_share": 2.0}, {"gap_m": 0.006, "left_share": 0.3}),
     "caster-swing": ({"loss": 0.3, "trail_m": 0.03}, {"loss": 0.6, "trail_m": 0.05}),
     "caster-trail": (
@@ -144,6 +145,7 @@ ALIKE = {
 TURNING = {
     "backlash",
     "backlash-mismatch",
+    "backlash-start",
     "braking-lag",
     "breakaway",
     "caster-drag",

@@ -14,8 +14,8 @@ from bns.physics.wheels.scans import played
 def apply(wheels: Wheels, gap_m: float) -> Wheels:
     """Each wheel loses ``gap_m`` of its distance whenever it changes direction."""
     return wheels.turning(
-        played(wheels.left_m_s, wheels.step_s, gap_m),
-        played(wheels.right_m_s, wheels.step_s, gap_m),
+        played(wheels.left_m_s, wheels.step_s, gap_m, gap_m),
+        played(wheels.right_m_s, wheels.step_s, gap_m, gap_m),
     )
 
 
@@ -32,7 +32,7 @@ EFFECT = Effect(
     sized="play in the gears stops a wheel for {gap_m} of its distance whenever it changes direction",
     measurement="hold the motor still, turn the wheel by hand, and measure the play at its rim",
     assumes="backlash: the gears are assumed to touch in the forward direction when a trial begins. If the robot drove backwards "
-    "or was pushed before, the gap is estimated too small: let it drive forward a little before each trial.",
+    "or was pushed before, the gap is estimated too small (`backlash-start`): let it drive forward a little before each trial.",
     apply=apply,
     needs="track",
     starts=tuple((gap,) for gap in (0.0005, 0.002, 0.005, 0.01, 0.02, 0.04)),

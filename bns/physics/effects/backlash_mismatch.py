@@ -18,9 +18,9 @@ _NOTABLE = 0.05
 
 def apply(wheels: Wheels, gap_m: float, left_share: float) -> Wheels:
     """At each change of its direction the left wheel loses ``left_share``·``gap_m``, the right one the rest of 2·``gap_m``."""
+    left_m, right_m = gap_m * left_share, gap_m * (2.0 - left_share)
     return wheels.turning(
-        played(wheels.left_m_s, wheels.step_s, gap_m * left_share),
-        played(wheels.right_m_s, wheels.step_s, gap_m * (2.0 - left_share)),
+        played(wheels.left_m_s, wheels.step_s, left_m, left_m), played(wheels.right_m_s, wheels.step_s, right_m, right_m)
     )
 
 

@@ -225,11 +225,14 @@ def sampled(target: Array, step_s: Array, period_s: float) -> Array:
 
 
 @exact
-def played(target: Array, step_s: Array, gap: float) -> Array:
-    """Mean over each step of what is driven through a gap (play): at the start the forward side touches; exact."""
+def played(target: Array, step_s: Array, gap: float, begin: float) -> Array:
+    """Mean over each step of what is driven through a gap (play), exact; at the start ``begin`` of it lies behind.
+
+    That is all of it where the forward side touches.
+    """
     mean = np.zeros_like(target)
     for row in range(target.shape[0]):
-        tooth = gap
+        tooth = begin
         for k in range(target.shape[1]):
             h = step_s[row, k]
             if h == 0.0:

@@ -49,6 +49,10 @@ JOINTS = {name: number(0.01) for name in ("across_rad", "at_m", "over_m")}
             "play in the gears stops the left wheel for 5.9 mm of its way whenever it changes direction, and t",
         ),
         (
+            *("backlash-start", {"gap_m": number(0.003), "crossed_share": number(0.5)}),
+            "play in the gears stops a wheel for 3 mm of its way whenever it changes direction, and for 1.5 mm when a trial",
+        ),
+        (
             "floor-joints",
             JOINTS | {"spacing_m": number(0.3302), "loss_m": number(0.003)},
             "a wheel loses 3 mm of its way at each of the lines on the floor that lie 0.33 m apart",
