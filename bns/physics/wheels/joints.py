@@ -20,7 +20,7 @@ _CERTAIN = 14.0
 """Power of a peak, in mean powers at that wavelength. By chance the largest of the some 30,000 is exp(-10) rare at 10; beyond 14
 in 3 of 100 logs. A false one costs a fit, since what is found here only begins one."""
 _PEAKS, _HARMONICS, _FINER = 6, 4, 4
-_FEWEST = 200
+_FEWEST, _MOST = 200, 20_000
 _ROWS = 3
 _ASIDE_RAD = 0.05
 _FEWEST_JOINTS, _OFTEN, _AS_MUCH, _MISSING = 3, 0.1, 0.4, 0.25
@@ -80,6 +80,11 @@ class _Ways:
     told: Array
     lost: Array
 
+    def thinned(self) -> _Ways:
+        """At most `_MOST` pieces, evenly chosen: enough to see where a peak of all of them is."""
+        every = len(self.told) // _MOST + 1
+        return _Ways(self.x[::every], self.y[::every], self.heading[::every], self.told[::every], self.lost[::every])
+
 
 def rows_of_joints(wheels: Wheels) -> list[tuple[Joints, float]]:
     """Rows at which tracked wheels seem to lose way, the surest first, each with the way lost (m); none where nothing stands out.
@@ -89,9 +94,9 @@ def rows_of_joints(wheels: Wheels) -> list[tuple[Joints, float]]:
     ways = _ways(wheels)
     if len(ways.told) < _FEWEST:
         return []
-    found = []
+    found, few = [], ways.thinned()
     for east, north in _peaks(ways):
-        score, row = _closest(ways, east, north)
+        score, row = _closest(few, east, north)
         found.append((score, row))
     rows: list[tuple[Joints, float]] = []
     for _, row in sorted(found, key=lambda one: -one[0]):
