@@ -16,7 +16,7 @@ from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.bodies.cycles import are_cycles, checked_cycles, cycle_tracks
 from bns.diagnose.data.bodies.joints import are_joints, joint_tracks
 from bns.diagnose.data.checks import Finding, checked, whole_names
-from bns.diagnose.data.located import BEGINS
+from bns.diagnose.data.located import BEGINS, OF_A_LOG
 from bns.diagnose.data.mapping import mapping_beside
 from bns.diagnose.data.sources.read import read_table
 from bns.diagnose.data.stamps import stamp_scatter
@@ -203,9 +203,10 @@ def naming(path: Path) -> Iterator[None]:
     try:
         yield
     except DataError as error:
-        if str(path) in str(error) or str(error).startswith(BEGINS):
-            raise
-        raise DataError(f"{path}: {error}") from error
+        said = str(error).replace(OF_A_LOG, f"{path.name}.import.yaml")
+        if str(path) in said or said.startswith(BEGINS):
+            raise DataError(said) from error
+        raise DataError(f"{path}: {said}") from error
 
 
 def _kept(table: pd.DataFrame) -> pd.DataFrame:

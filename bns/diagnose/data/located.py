@@ -13,6 +13,8 @@ from bns.errors import DataError
 from bns.safe_yaml import Lines
 
 BEGINS = "the mapping"
+OF_A_LOG = "LOG.import.yaml"
+"""The mapping of a log, in messages of those who do not know which log it is."""
 
 
 class LocatedMapping(dict[str, Any]):

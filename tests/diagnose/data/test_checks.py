@@ -11,7 +11,7 @@ from bns.api.compare import compare
 from bns.api.measurements import Measurements
 from bns.api.model import Model
 from bns.diagnose.data.checks import checked
-from bns.diagnose.data.load import _tracks
+from bns.diagnose.data.load import _tracks, load_measured
 from bns.diagnose.data.still_heading import _turned_m
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.data.units import _check_length, check_units
@@ -67,6 +67,14 @@ def test_good_data_pass_as_they_are(table):
 def test_misleading_data_are_refused(table, change, message):
     with pytest.raises(DataError, match=message):
         checked(table.assign(**change(table)))
+
+
+def test_a_message_names_the_mapping_of_the_log_that_it_is_about(table, tmp_path):
+    """Only who reads the file knows its name."""
+    path = tmp_path / "half.csv"
+    table.assign(t_s=table["t_s"] * 1000).to_csv(path, index=False)
+    with pytest.raises(DataError, match=r"half\.csv: .* mapping half\.csv\.import\.yaml"):
+        load_measured(path)
 
 
 @pytest.mark.parametrize(
