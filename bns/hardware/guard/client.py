@@ -42,21 +42,38 @@ class _Process(NamedTuple):
 
     process: subprocess.Popen[bytes]
     control: socket.socket
+    watch: socket.socket
+    """Tells who stands by whether it ended, or was killed."""
 
     @classmethod
-    def begun(cls) -> Self:
-        """A new one; it ends when the socket is closed."""
-        control, far = socket.socketpair()
-        script = [sys.executable, "-I", "-S", "-c", CODE, str(_FOLDER.parent), str(os.getpid())]
-        with far:
+    def begun(cls, watched: socket.socket | None = None) -> Self:
+        """A new one; it ends when the socket is closed. ``watched``: over which it hears of the process that it stands by for."""
+        (control, far), (ends, watch) = socket.socketpair(), socket.socketpair()
+        inherited = [ends.fileno(), *([] if watched is None else [watched.fileno()])]
+        script = [sys.executable, "-I", "-S", "-c", CODE, str(_FOLDER.parent), str(os.getpid()), *map(str, inherited)]
+        with far, ends:
             process = subprocess.Popen(
-                script, stdin=far.fileno(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+                script,
+                stdin=far.fileno(),
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,
+                pass_fds=inherited,
             )
-        return cls(process, control)
+        if watched is not None:
+            watched.close()
+        return cls(process, control, watch)
+
+    def say(self, what: bytes) -> None:
+        """Tell it; one that was killed hears nothing."""
+        with suppress(OSError):
+            self.control.send(what)
 
     def end(self) -> None:
         """Not needed; one that was stopped (SIGSTOP) is killed."""
+        self.say(b"g")
         self.control.close()
+        self.watch.close()
         try:
             self.process.wait(_ENDS_S)
         except subprocess.TimeoutExpired:
@@ -91,7 +108,20 @@ class Guard:
         if not Path(port).exists():
             raise HardwareError(no_port(port))
         self._start()
-        self._next = _Process.begun()
+        self._next = self._standing_by()
+
+    def _standing_by(self) -> _Process:
+        """A process that takes over by itself where the guard and this one are killed."""
+        begun = _Process.begun(self._watch)
+        begun.say((json.dumps(self._told() | {"standby": True}) + "\n").encode())
+        if self._armed:
+            begun.say(b"a")
+        return begun
+
+    def _told(self) -> dict[str, Any]:
+        """The set-up of a guard's process."""
+        told = self._setup | {"port": self._port, "link": self.path, "process": os.getpid()}
+        return told | {"log": self._log and str(self._log.absolute()), "stop": self._recipe.as_json()}
 
     def _start(self) -> None:
         folder = Path(self.path).parent if self.path else Path(tempfile.mkdtemp(prefix="bns-guard-"))
@@ -113,16 +143,15 @@ class Guard:
         return self._set_up(_Process.begun(), folder)
 
     def _set_up(self, begun: _Process, folder: Path) -> dict[str, Any]:
-        self._process, self._control = begun
+        self._process, self._control, self._watch = begun
         self._said = b""
         folder.mkdir(exist_ok=True)
-        setup = self._setup | {"port": self._port, "link": self.path, "process": os.getpid()}
-        setup |= {"log": self._log and str(self._log.absolute()), "stop": self._recipe.as_json()}
-        self._control.sendall((json.dumps(setup) + "\n").encode())
+        self._control.sendall((json.dumps(self._told()) + "\n").encode())
         return self._first_answer()
 
     def _gone(self, folder: Path) -> None:
         self._control.close()
+        self._watch.close()
         self._process.wait(_READY_S)
         with suppress(OSError):
             folder.rmdir()
@@ -158,11 +187,15 @@ class Guard:
         """The robot may move from now on."""
         self._armed = True
         self._tell(b"a")
+        if self._next is not None:
+            self._next.say(b"a")
 
     def still(self) -> None:
         """It was confirmed to stand."""
         self._armed = False
         self._tell(b"s")
+        if self._next is not None:
+            self._next.say(b"s")
 
     def stop_now(self) -> None:
         """Have the robot stopped at once, if it may move; the driver's own stop follows. For signal handlers."""
@@ -178,6 +211,7 @@ class Guard:
         """Say goodbye; whether the guard has ended. One that goes on is still trying to stop the robot."""
         self._tell(b"g")
         self._control.close()
+        self._watch.close()
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(_ENDS_S)
         ended = self._process.returncode is not None
@@ -217,13 +251,14 @@ class Guard:
             return
         self._tried_s = time.monotonic()
         self._control.close()
+        self._watch.close()
         self._process.wait(_READY_S)
         with suppress(HardwareError):  # then the driver finds no port, and says so
             self._start()
             if self._armed:
                 self.arm()
                 self.stop_now()  # the driver's own stop waits for its next look, and for the port to be opened again
-            self._next = _Process.begun()
+            self._next = self._standing_by()
 
 
 class GuardedClock(RealClock):

@@ -4,6 +4,9 @@
 trial. So this module and those that it imports (relatively: its folder is a package of its own there) import nothing else.
 Standard input is the control socket: first a line of JSON (the set-up), then single bytes: `.` a heartbeat, `a` the robot may
 move from now on, `s` it was confirmed to stand, `t` stop it now, `g` goodbye. Answers are lines of JSON.
+
+A process whose set-up says so stands by until it gets another one. It hears `a`, `s` and `g`, too, and over a socket of their own
+whether the process that guards ends (`d`) or is killed. Where the trial is gone as well, it takes over by itself.
 """
 
 from __future__ import annotations
@@ -15,13 +18,14 @@ import re
 import select
 import signal
 import socket
+import sys
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from .line import Line, OtherDeviceError
 from .order import StopOrder
-from .signs import GONE, not_running, slept_s
+from .signs import GONE, GONE_BOTH, not_running, slept_s
 
 TICK_S = 0.05
 _BUSY_S = 3.0
@@ -31,6 +35,8 @@ _SLEPT_S = 0.2
 _STANDS_S = 1.0
 """So long a robot that was not moving is asked to stand when its trial is gone."""
 _MOST_HEARD = 4096
+_TAKES_OVER_S = 1.0
+"""So long a trial that lives has to bring in who stands by, once its guard was killed."""
 
 
 class Guard:
@@ -71,6 +77,14 @@ class Guard:
                 if time.monotonic() > end_s:
                     raise
                 time.sleep(TICK_S)
+
+    def takes_over(self, armed: bool, why: str) -> None:
+        """Stop the robot: nobody else will. What comes over the control socket counts no more."""
+        signal.signal(signal.SIGTERM, self._terminate)
+        self._poll.unregister(self._control)
+        self._armed, self._gone = armed, True
+        self._trip(why)
+        self.run()
 
     def ready(self) -> None:
         """Say so, and what is at the port. From then on the robot may move, so that no SIGTERM ends this."""
@@ -251,14 +265,85 @@ def main() -> None:
     """Take the set-up from standard input, guard, end."""
     for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU, signal.SIGPIPE):
         signal.signal(number, signal.SIG_IGN)
-    control = socket.socket(fileno=os.dup(0))
+    control, ends = socket.socket(fileno=os.dup(0)), socket.socket(fileno=int(sys.argv[3]))
     line = b""
     while not line.endswith(b"\n"):
         byte = control.recv(1)
         if not byte:
             return
         line += byte
-    guard = Guard(json.loads(line), control)
+    setup = json.loads(line)
+    if setup.get("standby"):
+        watched = socket.socket(fileno=int(sys.argv[4]))
+        found = _stood_by(control, watched)
+        if isinstance(found, Lost):
+            _taken_over(setup, control, found)
+            return
+        if found is None:
+            return
+        setup = found
+    try:
+        _guarded(setup, control)
+    finally:
+        with contextlib.suppress(OSError):
+            ends.send(b"d")  # who stands by need not take over
+
+
+class Lost(NamedTuple):
+    """Whether the robot might move, and why nobody stops it."""
+
+    armed: bool
+    why: str
+
+
+def _stood_by(control: socket.socket, watched: socket.socket) -> dict[str, Any] | Lost | None:
+    """The set-up with which the trial brings this process in; that trial and guard are lost; None if nothing is left to do."""
+    poll = select.poll()
+    for one in (control, watched):
+        poll.register(one, select.POLLIN)
+    armed, text = False, b""
+    ended, killed_s = False, None
+    while True:
+        ready = {number for number, _ in poll.poll(1000 * TICK_S if killed_s is not None else None)}
+        if watched.fileno() in ready:
+            poll.unregister(watched)
+            ended = bool(_heard(watched))
+            killed_s = None if ended else time.monotonic()
+        if control.fileno() in ready:
+            said = _heard(control)
+            if not said:
+                if ended or (killed_s is None and _heard(watched)):
+                    return None
+                return Lost(armed, f"the trial's process and its guard {GONE_BOTH}")
+            text += said
+            while text and not text.startswith(b"{"):
+                letter, text = text[:1], text[1:]
+                if letter == b"g":
+                    return None
+                armed = letter == b"a" if letter in b"as" else armed
+            if b"\n" in text:
+                return dict(json.loads(text.split(b"\n", 1)[0]))
+        if killed_s is not None and time.monotonic() - killed_s > _TAKES_OVER_S:
+            return Lost(armed, "the guard of the robot's port was killed, and the trial does nothing about it")
+
+
+def _heard(line: socket.socket) -> bytes:
+    try:
+        return line.recv(4096)
+    except OSError:
+        return b""
+
+
+def _taken_over(setup: dict[str, Any], control: socket.socket, lost: Lost) -> None:
+    guard = Guard(setup, control)
+    try:
+        guard.takes_over(*lost)
+    finally:
+        guard.close()
+
+
+def _guarded(setup: dict[str, Any], control: socket.socket) -> None:
+    guard = Guard(setup, control)
     try:
         guard.first_open()
         guard.ready()

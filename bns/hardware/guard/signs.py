@@ -8,7 +8,7 @@ from pathlib import Path
 _TOGETHER_S, _READINGS = 0.01, 5
 """Two clocks are read within so many seconds of each other, at one of so many readings: a process may be stopped between."""
 
-STOPPED, GONE = "was stopped", "is gone"
+STOPPED, GONE, GONE_BOTH = "was stopped", "is gone", "are gone"
 _STATES = {b"T": STOPPED, b"t": STOPPED, b"Z": GONE, b"X": GONE}
 """Of a process, in proc_pid_stat(5)."""
 

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from bns.physics.signals import Array, Wheels
+from bns.physics.wheels.scans import crossings
 
 _OVER_M = 0.01
 """Over which way a wheel loses what it loses at a joint, where a fit begins."""
@@ -50,24 +51,11 @@ def crossed(place: Array, step_s: Array, aside_m: float, speed_m_s: Array, joint
 
     ``place``: in the middle of each step. Where one step ends the next begins, so that no joint is passed twice or not at all.
     """
-    x, y = place[..., 0] - aside_m * np.sin(place[..., 2]), place[..., 1] + aside_m * np.cos(place[..., 2])
-    steps = np.diff(joints.passed(_ends(x, step_s), _ends(y, step_s)), axis=1)
-    ahead = np.sign(speed_m_s) * np.sign(np.cos(place[..., 2] - joints.across_rad))
-    out: Array = np.where(step_s > 0.0, np.maximum(np.nan_to_num(steps) * ahead, 0.0), 0.0)
+    turned = place[..., 2] - joints.across_rad
+    along = place[..., 0] * np.cos(joints.across_rad) + place[..., 1] * np.sin(joints.across_rad) - aside_m * np.sin(turned)
+    ahead = np.sign(speed_m_s) * np.sign(np.cos(turned))
+    out: Array = crossings(along - joints.at_m, step_s, ahead, joints.spacing_m, joints.over_m)
     return out
-
-
-def _ends(middle: Array, step_s: Array) -> Array:
-    """What has these values in the middle of steps, where steps begin and end, (batch, steps + 1): on straight lines between."""
-    whole = step_s[:, 1:] + step_s[:, :-1]
-    share = step_s[:, :-1] / np.where(whole > 0.0, whole, 1.0)
-    inner = middle[:, :-1] + share * np.diff(middle, axis=1)
-    ends = np.concatenate([middle[:, :1], inner, middle[:, -1:]], axis=1)
-    if middle.shape[1] > 1:
-        rows, last = np.arange(len(middle)), np.maximum((step_s > 0.0).sum(axis=1) - 1, 0)
-        ends[:, 0] = 2.0 * middle[:, 0] - ends[:, 1]
-        ends[rows, last + 1] = 2.0 * middle[rows, last] - ends[rows, last]
-    return ends
 
 
 @dataclass(frozen=True)

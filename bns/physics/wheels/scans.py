@@ -244,6 +244,47 @@ def played(target: Array, step_s: Array, gap: float, begin: float) -> Array:
 
 
 @exact
+def crossings(along: Array, step_s: Array, ahead: Array, spacing: float, over: float) -> Array:
+    """How many multiples of ``spacing`` are passed in each step the way that ``ahead`` (1, -1) says, each over a way of ``over``.
+
+    ``along`` is where something is in the middle of each step, on a straight line between two; it goes on beyond the first and
+    the last one as it comes in and goes out. What is not known (NaN) passes none.
+    """
+    passed = np.zeros_like(along)
+    wide = min(over / spacing, 1.0)
+    for row in range(along.shape[0]):
+        last = -1
+        for k in range(along.shape[1]):
+            if step_s[row, k] > 0.0:
+                last = k
+        begin, behind = np.nan, np.nan
+        for k in range(last + 1):
+            if k < last:
+                whole = step_s[row, k] + step_s[row, k + 1]
+                share = step_s[row, k] / whole if whole > 0.0 else 0.0
+                end = along[row, k] + share * (along[row, k + 1] - along[row, k])
+            else:
+                end = 2.0 * along[row, k] - begin if last > 0 else along[row, k]
+            if k == 0:
+                begin = 2.0 * along[row, 0] - end if last > 0 else along[row, 0]
+                behind = _multiples(begin / spacing, wide)
+            if np.isnan(behind) and not np.isnan(begin):
+                behind = _multiples(begin / spacing, wide)
+            now = _multiples(end / spacing, wide) if not np.isnan(end) else np.nan
+            way = (now - behind) * ahead[row, k]
+            if step_s[row, k] > 0.0 and way > 0.0:
+                passed[row, k] = way
+            begin, behind = end, now
+    return passed
+
+
+@exact
+def _multiples(at: float, wide: float) -> float:
+    nearest = np.rint(at)
+    return float(nearest + min(max((at - nearest) / wide, -0.5), 0.5))
+
+
+@exact
 def reversed_since(speed: Array, step_s: Array) -> Array:
     """Way since the speed last changed its sign, in the middle of each step; -1 before it first does."""
     out = np.zeros_like(speed)

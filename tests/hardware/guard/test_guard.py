@@ -386,10 +386,57 @@ def test_what_stands_by_ends_even_if_it_was_stopped(held):
     assert standby.returncode == -signal.SIGKILL
 
 
-def test_what_stands_by_ends_with_the_trial(held):
+def test_what_stands_by_ends_when_the_trial_is_gone_and_the_guard_has_stopped_the_robot(tmp_path, held):
+    robot, guard = held("serial")
+    driver = driver_of("serial", guard, RealClock())
+    guard.arm()
+    set_off("serial", driver)
+    robot.until(True)
+    standby = guard._next
+    guard._control.close()
+    standby.control.close()
+    robot.until(False)
+    assert standby.process.wait(HANGS_S) == 0
+    assert [event["kind"] for event in outlive._events(tmp_path)] == ["tripped", "stopped"]
+    assert outlive._events(tmp_path)[0]["guard"] == guard.process
+
+
+@pytest.mark.parametrize("link", LINKS)
+@pytest.mark.parametrize(
+    ("hangs", "why"),
+    [
+        (False, "the trial's process and its guard are gone"),
+        (True, "the guard of the robot's port was killed, and the trial does nothing about it"),
+    ],
+)
+def test_what_stands_by_stops_the_robot_where_trial_and_guard_are_killed_at_once(tmp_path, held, link, hangs, why):
+    robot, guard = held(link)
+    driver = driver_of(link, guard, RealClock())
+    guard.arm()
+    set_off(link, driver)
+    robot.until(True)
+    standby = guard._next
+    os.kill(guard.process, signal.SIGKILL)
+    if not hangs:
+        guard._control.close()
+        standby.control.close()
+    robot.until(False)
+    assert standby.process.wait(HANGS_S) == 0
+    events = outlive._events(tmp_path)
+    assert (events[0]["why"], events[0]["guard"]) == (why, standby.process.pid)
+    assert events[-1]["kind"] == "stopped"
+
+
+def test_a_robot_that_did_not_move_is_asked_to_stand_and_left_alone_where_both_are_killed(tmp_path, held):
     _, guard = held("serial")
-    guard._next.control.close()
-    assert guard._next.process.wait(HANGS_S) == 0
+    guard.arm()
+    guard.still()
+    standby = guard._next
+    os.kill(guard.process, signal.SIGKILL)
+    guard._control.close()
+    standby.control.close()
+    assert standby.process.wait(HANGS_S) == 0
+    assert outlive._events(tmp_path)[0]["kind"] == "tripped"
 
 
 def test_a_port_in_use_is_named(tmp_path):

@@ -24,7 +24,7 @@ import os, sys
 from tests.hardware.guard.test_holder import RECIPE, Guard
 guard = Guard(sys.argv[1], RECIPE, 0.3)
 guard.arm()
-os.write(1, str(guard.process).encode())
+os.write(1, f"{guard.process} {guard._next.process.pid}".encode())
 os._exit(4)
 """
 
@@ -40,25 +40,29 @@ def port():
 
 @pytest.fixture
 def left_behind(port):
-    """The process of a guard whose trial has ended while its robot may move."""
+    """The processes of a guard whose trial has ended while its robot may move, and of what stands by."""
     root = Path(__file__).parents[3]
     done = subprocess.run([sys.executable, "-c", DIES, port], cwd=root, stdout=subprocess.PIPE, timeout=60, check=False)
-    guard = int(done.stdout)
-    yield guard
-    with suppress(ProcessLookupError):
-        os.kill(guard, signal.SIGKILL)
+    guards = [int(one) for one in done.stdout.split()]
+    yield guards
+    for one in guards:
+        with suppress(ProcessLookupError):
+            os.kill(one, signal.SIGKILL)
 
 
 def test_a_guard_without_a_trial_is_named_and_how_to_end_it(port, left_behind, capsys):
-    os.kill(left_behind, signal.SIGTERM)  # which is to make it stop the robot, not to end it
+    guard, standby = left_behind
+    os.kill(guard, signal.SIGTERM)  # which is to make it stop the robot, not to end it
     time.sleep(0.3)
     with pytest.raises(HardwareError) as said:
         open_port(port, 115200, RealClock())
-    assert f"is in use by the guard (process {left_behind}) of a trial that has ended" in str(said.value)
-    assert f"Cut its power; then end the guard: kill -9 {left_behind}" in str(said.value)
+    assert f"is in use by the guard (process {guard}) of a trial that has ended" in str(said.value)
+    both = "kill -9 " + " ".join(map(str, sorted(left_behind)))
+    assert f"Cut its power; then end the guard: {both}" in str(said.value)
     assert main(["servos", "scan", "--port", port]) == 2
-    assert f"kill -9 {left_behind}" in capsys.readouterr().err
-    os.kill(left_behind, signal.SIGKILL)
+    assert both in capsys.readouterr().err
+    os.kill(guard, signal.SIGKILL)
+    os.kill(standby, signal.SIGKILL)
     until_free(port)
 
 
