@@ -29,7 +29,7 @@ def wild_of(table):
 def test_two_bad_trials_of_38_hide_nothing_and_are_named():
     good, bad = hidden(wheelbase={"factor": 1.04}), hidden(wheelbase={"factor": 0.6})
     predictor = WheelPredictor(tracks_of(with_bad(good, bad)))
-    found = diagnose(predictor, NOMINAL)
+    found = diagnose(predictor, NOMINAL, barred=all_but_rivals_of("wheelbase"))
     assert (found.verdict, found.effects) == ("effects", ("wheelbase",))
     answer = found.as_json()
     number = answer["parameters"]["wheelbase"]["factor"]
