@@ -33,7 +33,7 @@ from bns.diagnose.residuals.unexplained import NOTHING, Unexplained
 from bns.diagnose.residuals.worst_in_words import on_worst
 from bns.diagnose.residuals.worst_trials import Apart, WithoutWorst
 from bns.physics.effects import all_effects, effect_named
-from tests.diagnose.worlds import NOMINAL, measured
+from tests.diagnose.worlds import NOMINAL, all_but_rivals_of, measured
 
 MODELS = (SimpleNamespace(rms_m=0.1), SimpleNamespace(rms_m=0.1))
 
@@ -124,7 +124,7 @@ def test_a_measured_number_that_the_data_contradict_is_said_to():
     predictor = WheelPredictor(tracks_of(measured(truth, trials=14, seed=2)))
     for tau_s, said in ((0.1, True), (0.2, False)):
         given = NOMINAL.with_effect("motor-lag", basis="measured", reason="on the bench", tau_s=tau_s)
-        found = diagnose(predictor, given)
+        found = diagnose(predictor, given, barred=all_but_rivals_of("wheelbase", "motor-lag"))
         assert found.effects == ("wheelbase",)
         about = [note for note in found.notes if note.startswith("motor-lag was measured (tau_s = 0.1 s); its param")]
         assert bool(about) == said
@@ -299,7 +299,7 @@ def thinned(every):
 @pytest.mark.slow
 def test_a_clock_that_comes_from_commands_logged_with_poses_is_said_to():
     """A command between two poses seems to begin with the second one: half an interval late on average."""
-    found = diagnose(thinned(4), NOMINAL)
+    found = diagnose(thinned(4), NOMINAL, barred=all_but_rivals_of("clock-offset"))
     assert found.effects == ("clock-offset",)
     assert found.numbers["clock-offset"]["offset_s"]["value"] == pytest.approx(-0.08 + 0.02, abs=0.01)
     assert any("shorter than the 0.16 s between poses" in note for note in found.notes)

@@ -13,8 +13,10 @@ from bns.cli.main import main
 from bns.measurements import write_measurements
 from bns.physics.formula import formula_effect
 from bns.physics.model import load_model
-from tests.diagnose.worlds import NOMINAL, hidden, measured
+from tests.diagnose.worlds import NOMINAL, all_but_rivals_of, hidden, measured
 
+ONLY_RIVALS = [word for name in all_but_rivals_of("turn-slip") for word in ("--without-effect", name)]
+"""For what is asked of a diagnosis besides its verdict."""
 WARMING = NOMINAL.with_active(formula_effect("rough", "k * exp(-tau / 2)", "share"), (-0.15,))
 
 
@@ -63,9 +65,9 @@ def test_added_effects_lower_the_error_and_the_model_comes_back(data, tmp_path, 
 def test_a_diagnosis_writes_the_model_that_it_found_and_says_how(data, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("BNS_CACHE", str(tmp_path / "cache"))  # as a user's: what is asked twice is computed once
     new, added = tmp_path / "found.yaml", tmp_path / "added.yaml"
-    words = ["diagnose", str(data), "--model", "khepera"]
+    words = ["diagnose", str(data), "--model", "khepera", *ONLY_RIVALS]
     assert main(words) == 0
-    assert capsys.readouterr().out.endswith(f"bns diagnose {data} --model khepera -o extended.yaml\n")
+    assert capsys.readouterr().out.endswith(f"bns diagnose {data} --model khepera {' '.join(ONLY_RIVALS)} -o extended.yaml\n")
     assert main([*words, "-o", str(new)]) == 0
     assert f"written to {new}; the old model is unchanged (khepera)" in capsys.readouterr().out
     assert main(["add", str(data), "turn-slip", "--model", "khepera", "-o", str(added)]) == 0
@@ -76,14 +78,14 @@ def test_a_diagnosis_writes_the_model_that_it_found_and_says_how(data, tmp_path,
     errors = model.provenance["held_out_position_error_m"]
     assert errors["with the effects"]["command"] < errors["as given"]["command"]
     capsys.readouterr()
-    assert main(["diagnose", str(data), "--model", str(new), "-o", str(tmp_path / "more.yaml")]) == 0
+    assert main(["diagnose", str(data), "--model", str(new), "-o", str(tmp_path / "more.yaml"), *ONLY_RIVALS]) == 0
     assert "Nothing was found to add, so" in capsys.readouterr().out
     assert not (tmp_path / "more.yaml").exists()
-    refitted = bns.diagnose(data, new)
+    refitted = bns.diagnose(data, new, without_effects=ONLY_RIVALS[1::2])
     assert refitted.model.values_of("turn-slip")["slip_s"] == refitted.parameters.set_index("parameter").value["slip_s"]
     own = tmp_path / "own.yaml"
     bns.Model("khepera").save(own)
-    assert main(["diagnose", str(data), "--model", str(own), "-o", str(own)]) == 0
+    assert main(["diagnose", str(data), "--model", str(own), "-o", str(own), *ONLY_RIVALS]) == 0
     assert f"written to {own}; in the place of the model as given" in capsys.readouterr().out
     assert main([*words, "-o", str(tmp_path / "model.txt")]) == 2
     assert "must end in .yaml" in capsys.readouterr().err
@@ -93,7 +95,7 @@ def test_a_diagnosis_writes_the_model_that_it_found_and_says_how(data, tmp_path,
 def test_a_diagnosis_writes_terms_that_lower_the_error_where_no_effect_is_listed(tmp_path, capsys):
     log, new = tmp_path / "warming.parquet", tmp_path / "found.yaml"
     write_measurements(measured(WARMING, trials=24, seed=3), log)
-    words = ["diagnose", str(log), "--model", "khepera", "--without-effect", "warm-up", "-o", str(new)]
+    words = ["diagnose", str(log), "--model", "khepera", "--without-effect", "warm-up", *ONLY_RIVALS, "-o", str(new)]
     assert main(words) == 0
     assert "added to share: " in capsys.readouterr().out
     before, after = (bns.compare(log, model).errors.position_m["trial"] for model in ("khepera", new))

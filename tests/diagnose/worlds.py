@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 
+from bns.physics.effects import all_effects
 from bns.physics.model import Model
 from bns.physics.wheels.differential_drive import observe, track
 
@@ -17,6 +18,25 @@ def hidden(**effects):
     for name, values in effects.items():
         model = model.with_effect(name.replace("_", "-"), **values)
     return model
+
+
+USUAL = frozenset(
+    ("speed-gain", "wheelbase", "wheel-mismatch", "yaw-bias", "motor-lag", "clock-offset", "command-delay", "dead-zone")
+)
+
+
+def all_but_rivals_of(*names):
+    """What to bar so that a search weighs these effects against what looks like them, holds or extends them, and the usual ones.
+
+    For a test of one decision: with all of the list a search takes several times as long.
+    """
+    catalogue = all_effects()
+    left = USUAL | set(names)
+    for name in names:
+        looks_like = {other for other, effect in catalogue.items() if name in effect.lookalikes}
+        longer = {other for other, effect in catalogue.items() if name in (effect.extends, *effect.contains)}
+        left |= looks_like | longer | {*catalogue[name].lookalikes, catalogue[name].extends}
+    return tuple(sorted(set(catalogue) - left))
 
 
 def measured(

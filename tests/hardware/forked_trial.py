@@ -14,14 +14,20 @@ import sys
 import tempfile
 import time
 from dataclasses import replace
+from functools import partialmethod
 from pathlib import Path
 
 import numpy as np
 
 from bns.errors import BnsError
+from bns.hardware.clock import RealClock
+from bns.hardware.guard import client as guard_client
+from bns.hardware.guard.client import GuardedClock
 from bns.hardware.platforms import khepera, snake
 from bns.hardware.rig import shipped_rig
 from bns.hardware.safety import Stopping, Surface
+from bns.hardware.servos.bridge import BridgeChain
+from bns.hardware.servos.dynamixel import DynamixelChain
 from bns.hardware.tracking.sight import Sight
 from bns.hardware.wheels.khepera import KheperaIII
 from bns.robots.khepera import UNITS_PER_M_S
@@ -41,13 +47,15 @@ class Glances:
 
     frozen = ""
     sent_s = None
+    patient = False
 
     def __init__(self, clock, wheels):
         self._clock, self._wheels, self._filmed_s, self._last = clock, wheels, 0.0, None
 
     @property
     def picture_s(self):
-        return self._last.t_s
+        """A patient trial's camera that is not frozen has just sent one, however late this process comes to ask."""
+        return self._clock.now_s() if self.patient and self.frozen != "bits" else self._last.t_s
 
     def look(self):
         now_s = self._clock.now_s()
@@ -96,6 +104,16 @@ def standing_after(stop):
     return stopped
 
 
+def answered_or_over(self, seconds):
+    """`GuardedClock.in_vain`, but that an answer is waited for until the guard passes none on any more.
+
+    The robot is a thread of a test, and may have to wait for its turn for longer than a driver waits for a robot.
+    """
+    over = RealClock.in_vain(self, seconds)
+    hangs = RealClock.in_vain(self, max(seconds, HANGS_S))
+    return lambda: hangs() or (over() and self._guard.tripped() is not None)
+
+
 def freeze(what):
     def freezes(*_):
         Glances.frozen = what
@@ -108,6 +126,7 @@ def drive(link, port, journal, patient):
 
     `patient`: a computer that is too busy for its limits stops nothing, so that only what befalls it does.
     """
+    Glances.patient = patient
     robot = "khepera" if link == "serial" else "snake"
     wheels = np.array([15000.0, 20000.0]) / UNITS_PER_M_S if link == "serial" else None
     khepera.open_tracker = snake.open_tracker = lambda _settings, clock: Glances(clock, wheels)
@@ -119,6 +138,10 @@ def drive(link, port, journal, patient):
     if patient:
         everywhere = replace(everywhere, silent_s=HANGS_S, late_s=HANGS_S, lost_s=HANGS_S)
         settings = settings | ({"most_reply_s": HANGS_S} if robot == "khepera" else {})
+        guard_client._READY_S = HANGS_S
+        GuardedClock.in_vain = answered_or_over
+        for chain in (DynamixelChain, BridgeChain):
+            chain.stop = partialmethod(chain.stop, HANGS_S)
     rig = replace(rig, port=port, driver=settings, limits=everywhere)
     signal.signal(signal.SIGRTMIN, freeze("bits"))
     signal.signal(signal.SIGRTMIN + 1, freeze("scene"))
@@ -193,6 +216,10 @@ class Nursery:
         number = int(said)
         os.close(far)
         return number, terminal
+
+    def tells(self):
+        """Whether something became of it already."""
+        return bool(select.select([self._zygote.stdout], [], [], 0)[0])
 
     def heard(self):
         """What became of it: it stopped, or ended."""

@@ -163,7 +163,7 @@ def outlived(nursery, link, cause, folder, gone_s=0.0, kind=Robot, patient=False
 def _befell(nursery, robot, cause, folder, gone_s, patient):
     process, terminal = nursery.begin(robot.link, robot.path, folder / "journal.jsonl", patient)
     try:
-        robot.until(True, HANGS_S)
+        robot.until(True, HANGS_S, lambda: _why_not(nursery, folder))
         time.sleep(_ARMED_S if cause.startswith("camera") and robot.link != "serial" else 0.25)
         began_s = time.monotonic()
         CAUSES[cause](Befalls(robot, process, terminal, nursery.slept))
@@ -183,6 +183,14 @@ def _befell(nursery, robot, cause, folder, gone_s, patient):
     finally:
         if cause != "terminal closed":
             os.close(terminal)
+
+
+def _why_not(nursery, folder):
+    """Why the robot will not move any more: what its trial said when it ended."""
+    if not nursery.tells():
+        return ""
+    said = folder / "said"
+    return f"{nursery.heard()} ({said.read_text() if said.exists() else 'it said nothing'})"
 
 
 def _events(folder):

@@ -102,10 +102,12 @@ class Robot:
             return max(np.abs(self.body.wheel_speeds_m_s(self.clock.now_s()))) > STILL_M_S
         return any(servo.get("torque_enable") for servo in self.servos)
 
-    def until(self, moving, patience_s=60.0):
-        """Wait until it moves or stands; when that was. AssertionError after a time that only a hang can take."""
+    def until(self, moving, patience_s=60.0, why_never=lambda: ""):
+        """Wait until it moves or stands; when that was. AssertionError after a time that only a hang can take, or with what
+        `why_never` says."""
         end_s = time.monotonic() + patience_s
         while self.moves() != moving:
+            assert not (why := why_never()), f"the robot {'never moved' if moving else 'never stood'}: {why}"
             assert time.monotonic() < end_s, f"the robot {'never moved' if moving else 'never stood'}"
             time.sleep(0.002)
         return time.monotonic()

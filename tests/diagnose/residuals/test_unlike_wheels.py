@@ -37,7 +37,7 @@ def driven(trials=20, **effects):
     ],
 )
 def test_each_is_named_with_its_numbers(name, values):
-    found = diagnose(driven(**{name.replace("-", "_"): values}), NOMINAL)
+    found = diagnose(driven(trials=14, **{name.replace("-", "_"): values}), NOMINAL)
     assert (found.verdict, found.effects) == ("effects", (name,))
     assert {key: one["value"] for key, one in found.numbers[name].items()} == pytest.approx(values, rel=0.03)
 

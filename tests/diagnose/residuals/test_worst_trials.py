@@ -10,7 +10,7 @@ from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report.text import diagnosis_text
 from bns.diagnose.residuals.worst_trials import apart, most_left_out, standing_out
-from tests.diagnose.worlds import NOMINAL, hidden, measured
+from tests.diagnose.worlds import NOMINAL, all_but_rivals_of, hidden, measured
 
 
 def with_bad(good, bad, trials=36, of_them=2):
@@ -29,7 +29,7 @@ def wild_of(table):
 def test_two_bad_trials_of_38_hide_nothing_and_are_named():
     good, bad = hidden(wheelbase={"factor": 1.04}), hidden(wheelbase={"factor": 0.6})
     predictor = WheelPredictor(tracks_of(with_bad(good, bad)))
-    found = diagnose(predictor, NOMINAL)
+    found = diagnose(predictor, NOMINAL, barred=all_but_rivals_of("wheelbase"))
     assert (found.verdict, found.effects) == ("effects", ("wheelbase",))
     answer = found.as_json()
     number = answer["parameters"]["wheelbase"]["factor"]
@@ -99,7 +99,7 @@ def test_the_worst_trials_hide_the_next_ones_and_together_they_count():
     """Two are held for nearly a whole trial, two for its last part: next to the first, the others look like the rest."""
     table = held_from(measured(NOMINAL, trials=40, seed=2), {3: 0.05, 17: 0.05, 22: 0.9, 31: 0.9})
     predictor = WheelPredictor(tracks_of(table))
-    found = diagnose(predictor, NOMINAL)
+    found = diagnose(predictor, NOMINAL, barred=all_but_rivals_of("wheelbase"))
     assert found.verdict == "unlisted"
     assert found.without_worst is None
     note = next(note for note in found.notes if "Unlike all others" in note)

@@ -11,7 +11,7 @@ from bns.diagnose.estimate.starts import fit_extended, fit_with, listed
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.physics.effects import command_rate, effect_named
 from bns.physics.signals import Conditions, Wheels
-from tests.diagnose.worlds import BASE_M, FRAME_S, NOMINAL, hidden, measured
+from tests.diagnose.worlds import BASE_M, FRAME_S, NOMINAL, all_but_rivals_of, hidden, measured
 
 
 def driven(trials=20, **effects):
@@ -38,7 +38,7 @@ def driven(trials=20, **effects):
     ],
 )
 def test_each_is_named_with_its_numbers(name, values):
-    found = diagnose(driven(**{name.replace("-", "_"): values}), NOMINAL)
+    found = diagnose(driven(trials=14, **{name.replace("-", "_"): values}), NOMINAL)
     assert (found.verdict, found.effects) == ("effects", (name,))
     assert {key: one["value"] for key, one in found.numbers[name].items()} == pytest.approx(values, rel=0.03)
 
@@ -153,7 +153,7 @@ def test_of_a_long_trial_only_the_beginning_is_looked_at(monkeypatch):
 @pytest.mark.slow
 def test_ticks_of_no_round_period_before_a_lag_are_named_with_their_numbers():
     """Beside a lag that stands for both, a period at whose ticks wheels are later fits only when the lag gives way."""
-    found = diagnose(on_ticks(0.1307, 0.07), NOMINAL)
+    found = diagnose(on_ticks(0.1307, 0.07, trials=14), NOMINAL, barred=all_but_rivals_of("command-rate", "motor-lag"))
     assert (found.verdict, set(found.effects)) == ("effects", {"command-rate", "motor-lag"})
     assert found.numbers["command-rate"]["period_s"]["value"] == pytest.approx(0.1307, abs=2e-4)
     assert found.numbers["motor-lag"]["tau_s"]["value"] == pytest.approx(0.07, rel=0.02)

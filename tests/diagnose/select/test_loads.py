@@ -15,17 +15,17 @@ from bns.diagnose.select import acceptance, extending, forwards, look_back
 from bns.diagnose.select.stepwise import StepwiseSelection
 from bns.diagnose.values import numbers_of
 from bns.physics.effects import all_effects, effect_named
-from tests.diagnose.worlds import NOMINAL, hidden, measured
+from tests.diagnose.worlds import NOMINAL, all_but_rivals_of, hidden, measured
 
 
-def selected(model, **how):
+def selected(model, barred=(), **how):
     predictor = WheelPredictor(tracks_of(measured(model, **{"trials": 20, "seed": 11, "speeds": (-0.2, 0.2)} | how)))
-    return StepwiseSelection(predictor, NOMINAL).run()
+    return StepwiseSelection(predictor, NOMINAL, barred=barred).run()
 
 
 @pytest.mark.slow
 def test_turns_that_lag_less_than_straight_lines_take_the_lags_place():
-    found = selected(hidden(inertia_lag={"tau_s": 0.25, "turn_ratio": 0.3}))
+    found = selected(hidden(inertia_lag={"tau_s": 0.25, "turn_ratio": 0.3}), all_but_rivals_of("inertia-lag"))
     assert found.accepted == ("inertia-lag",)
     replaced = {step.instead_of for step in found.steps if step.selected == "inertia-lag"}
     assert replaced
@@ -82,11 +82,12 @@ def test_wheels_that_lag_alike_keep_the_simple_lag():
 def test_ramps_of_velocity_and_turn_rate_are_told_from_limits_of_each_wheel():
     """As the velocity smoothers of ROS have them, with a lag of the motors behind."""
     ramps = {"forward_m_s2": 0.3, "turn_rad_s2": 4.0}
-    found = selected(hidden(velocity_ramp=ramps, motor_lag={"tau_s": 0.06}))
+    barred = all_but_rivals_of("velocity-ramp", "acceleration-limit", "motor-lag")
+    found = selected(hidden(velocity_ramp=ramps, motor_lag={"tau_s": 0.06}), barred)
     assert set(found.accepted) == {"velocity-ramp", "motor-lag"}
     assert found.fit.model.values_of("velocity-ramp") == pytest.approx(ramps, rel=0.05)
     assert found.fit.model.values_of("motor-lag")["tau_s"] == pytest.approx(0.06, rel=0.1)
-    single = selected(hidden(acceleration_limit={"max_m_s2": 0.3}))
+    single = selected(hidden(acceleration_limit={"max_m_s2": 0.3}), barred)
     assert single.accepted == ("acceleration-limit",)
 
 
@@ -186,9 +187,8 @@ def test_an_extension_equals_what_it_extends_where_its_own_numbers_are_neutral()
 @pytest.mark.slow
 def test_a_slope_on_wheels_that_grip_is_no_drift():
     slope = {"x_m_s": 0.012, "y_m_s": -0.007, "behind_share": 0.1, "at_rest": 0.0}
-    answer = diagnose(
-        WheelPredictor(tracks_of(measured(hidden(slope_load=slope), trials=20, seed=11, speeds=(-0.2, 0.2)))), NOMINAL
-    ).as_json()
+    predictor = WheelPredictor(tracks_of(measured(hidden(slope_load=slope), trials=20, seed=11, speeds=(-0.2, 0.2))))
+    answer = diagnose(predictor, NOMINAL, barred=all_but_rivals_of("slope-load")).as_json()
     assert (answer["verdict"], answer["effects"]) == ("effects", ["slope-load"])
     numbers = answer["parameters"]["slope-load"]
     assert all(numbers[name]["low"] < slope[name] < numbers[name]["high"] for name in ("x_m_s", "y_m_s", "behind_share"))
@@ -231,7 +231,7 @@ OVERSHOOT = {"tau_s": 0.06, "lead_s": 0.1, "swing_s": 0.12, "turn_ratio": 0.5}
 
 @pytest.mark.slow
 def test_controllers_that_overshoot_are_found_and_told_from_a_late_clock():
-    found = selected(hidden(controller_overshoot=OVERSHOOT))
+    found = selected(hidden(controller_overshoot=OVERSHOOT), all_but_rivals_of("controller-overshoot", "inertia-lag"))
     assert found.accepted == ("controller-overshoot",)
     assert found.fit.model.values_of("controller-overshoot") == pytest.approx(OVERSHOOT, rel=0.1)
     assert not found.competing_models
@@ -322,8 +322,9 @@ def test_friction_that_does_nothing_goes_back_to_the_inertia_of_turns(friction):
 def test_friction_in_the_gears_is_told_from_a_lag_and_a_dead_zone_also_where_a_lag_is_given():
     friction = {"tau_s": 0.15, "turn_ratio": 0.5, "friction_m_s": 0.06, "loss_m_s": 0.01}
     table = measured(hidden(gear_friction=friction), trials=20, seed=11, speeds=(-0.2, 0.2))
+    barred = all_but_rivals_of("gear-friction", "inertia-lag")
     for given in (NOMINAL, NOMINAL.with_effect("inertia-lag", "measured", "bench", tau_s=0.1, turn_ratio=0.5)):
-        found = StepwiseSelection(WheelPredictor(tracks_of(table)), given).run()
+        found = StepwiseSelection(WheelPredictor(tracks_of(table)), given, barred=barred).run()
         assert found.accepted == ("gear-friction",)
         assert [a.effect.name for a in found.fit.model.effects] == ["gear-friction"]
         assert found.fit.model.values_of("gear-friction") == pytest.approx(friction, rel=0.1)
@@ -335,7 +336,8 @@ def test_friction_against_turns_is_one_effect_beside_a_lag(tau_s):
     """A short lag looks like a late clock at first, which then gives way together with the turn rate that is lost."""
     friction = {"tau_s": tau_s, "turn_ratio": 0.7, "width_rad_s": 0.4}
     table = measured(hidden(scrub_friction=friction), trials=30, seed=12, speeds=(-0.2, 0.2))
-    found = StepwiseSelection(WheelPredictor(tracks_of(table)), NOMINAL).run()
+    barred = all_but_rivals_of("scrub-friction", "inertia-lag")
+    found = StepwiseSelection(WheelPredictor(tracks_of(table)), NOMINAL, barred=barred).run()
     assert found.accepted == ("scrub-friction",)
     assert found.fit.model.values_of("scrub-friction") == pytest.approx(friction, rel=0.15)
 
@@ -345,7 +347,7 @@ def test_a_lag_from_the_bench_gives_way_to_turns_that_lag_otherwise_and_the_repo
     table = measured(hidden(inertia_lag={"tau_s": 0.25, "turn_ratio": 0.3}), trials=20, seed=11, speeds=(-0.2, 0.2))
     predictor = WheelPredictor(tracks_of(table))
     given = NOMINAL.with_effect("motor-lag", "measured", "bench", tau_s=0.2)
-    found = StepwiseSelection(predictor, given).run()
+    found = StepwiseSelection(predictor, given, barred=all_but_rivals_of("inertia-lag")).run()
     assert found.accepted == ("inertia-lag",)
     assert [(step.selected, step.instead_of) for step in found.steps if step.selected] == [("inertia-lag", "motor-lag")]
     assert [a.effect.name for a in found.fit.model.effects] == ["inertia-lag"]

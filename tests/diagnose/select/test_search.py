@@ -23,11 +23,12 @@ from bns.physics.decoys import DECOYS
 from bns.physics.effects import all_effects, effect_named
 from bns.physics.formula import formula_effect
 from bns.physics.model import ActiveEffect
-from tests.diagnose.worlds import NOMINAL, hidden, measured
+from tests.diagnose.worlds import NOMINAL, all_but_rivals_of, hidden, measured
 
 
-def diagnosed(model, **how):
-    return diagnose(WheelPredictor(tracks_of(measured(model, **{"trials": 20, "seed": 11} | how))), NOMINAL)
+def diagnosed(model, barred=(), **how):
+    predictor = WheelPredictor(tracks_of(measured(model, **{"trials": 20, "seed": 11} | how)))
+    return diagnose(predictor, NOMINAL, barred=barred)
 
 
 def test_nothing_is_found_where_nothing_is_hidden():
@@ -49,7 +50,7 @@ def test_one_effect_is_named_with_its_size():
 
 @pytest.mark.slow
 def test_a_late_command_ties_with_a_late_clock():
-    answer = diagnosed(hidden(command_delay={"delay_s": 0.08})).as_json()
+    answer = diagnosed(hidden(command_delay={"delay_s": 0.08}), all_but_rivals_of("clock-offset", "command-delay")).as_json()
     assert answer["verdict"] == "tie"
     assert answer["ties"] == [["clock-offset", "command-delay"]]
     assert sorted(map(tuple, answer["explanations"])) == [("clock-offset",), ("command-delay",)]
@@ -58,7 +59,7 @@ def test_a_late_command_ties_with_a_late_clock():
 
 @pytest.mark.slow
 def test_an_early_clock_is_no_late_command():
-    answer = diagnosed(hidden(clock_offset={"offset_s": -0.08})).as_json()
+    answer = diagnosed(hidden(clock_offset={"offset_s": -0.08}), all_but_rivals_of("clock-offset", "command-delay")).as_json()
     assert (answer["verdict"], answer["effects"]) == ("effects", ["clock-offset"])
     assert "clock-offset is an error of the measurement, not of the robot." in answer["notes"]
 
@@ -67,7 +68,7 @@ def test_an_early_clock_is_no_late_command():
 def test_what_no_list_holds_is_called_so_and_a_formula_offered():
     rough = formula_effect("rough", "k * v * exp(-tau / 3)", "v")
     model = NOMINAL.with_active(rough, (-0.12,))
-    answer = diagnosed(model).as_json()
+    answer = diagnosed(model, all_but_rivals_of("speed-gain")).as_json()
     assert answer["verdict"] == "unlisted"
     assert answer["residual_dependence"][0]["variable"] in {"time_in_trial_s", "way_m"}
     assert answer["formula"]["on"] == "v"
@@ -78,7 +79,7 @@ def test_what_no_list_holds_is_called_so_and_a_formula_offered():
 def test_a_model_that_has_the_effect_already_lacks_nothing():
     table = measured(hidden(wheelbase={"factor": 1.05}), trials=20, seed=11)
     model = NOMINAL.with_effect("wheelbase", factor=1.0)
-    found = diagnose(WheelPredictor(tracks_of(table)), model)
+    found = diagnose(WheelPredictor(tracks_of(table)), model, barred=all_but_rivals_of("wheelbase"))
     assert found.verdict == "none"
     assert found.as_json()["parameters"]["wheelbase"]["factor"]["value"] == pytest.approx(1.05, abs=0.01)
 
@@ -164,7 +165,7 @@ def test_what_asks_for_too_much_once_noise_and_numbers_have_settled_is_passed_ov
 
     monkeypatch.setattr(Acceptance, "rejected", lambda _, fit, name, bounds=True: rejected_because(fit, name, bounds))
     tracks = tracks_of(measured(hidden(wheelbase={"factor": 1.05}), trials=12, seed=11))
-    found = StepwiseSelection(WheelPredictor(tracks), NOMINAL).run()
+    found = StepwiseSelection(WheelPredictor(tracks), NOMINAL, barred=all_but_rivals_of("wheelbase")).run()
     first = found.steps[0].ranking[0]
     assert (first.name, first.rejected_because) == ("wheelbase", "too much")
     assert "wheelbase" not in found.accepted
