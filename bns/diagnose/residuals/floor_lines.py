@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,8 @@ GROUPS = DEFAULTS.residuals.line_groups
 FRAMES = DEFAULTS.residuals.line_frames
 STRIP_FRAMES = DEFAULTS.residuals.line_strip_frames
 LEVELS = DEFAULTS.residuals.line_levels
-APART_DEG = DEFAULTS.residuals.line_apart_deg
+_APART_RAD = math.radians(DEFAULTS.residuals.line_apart_deg)
+MOST = DEFAULTS.residuals.line_most
 SEEN_Z = DEFAULTS.residuals.line_seen_z
 EVEN = DEFAULTS.residuals.line_even
 FINER = DEFAULTS.residuals.line_finer
@@ -88,6 +89,12 @@ class _Passes:
     way_m: Array
     command: NDArray[np.int64]
 
+    def but_at(self, lines: FloorLines, width_m: float) -> _Passes:
+        """All but those within ``width_m`` of a line."""
+        along = self.along(lines.across_rad)
+        kept = (np.abs(along[:, None] - np.array(lines.at_m)) > width_m).all(axis=1)
+        return _Passes(*(getattr(self, one.name)[kept] for one in fields(self)))
+
     def along(self, across_rad: float) -> Array:
         """Coordinate (m) in that direction."""
         return self.x * np.cos(across_rad) + self.y * np.sin(across_rad)
@@ -104,7 +111,10 @@ def what_to_look_for(lines: Sequence[FloorLines]) -> str:
 
 
 def floor_lines(problem: Problem, fit: Fit) -> tuple[FloorLines, ...]:
-    """The lines of one direction or of two that lie across one another, the surest first; none where nothing is certain."""
+    """The lines of each direction that has some, the surest first; none where nothing is certain.
+
+    What moves there is left out before the next direction is looked for, so that no line is seen aslant.
+    """
     tracks = problem.predictor.tracks
     if not isinstance(problem.predictor, WheelPredictor) or tracks.relative or len(tracks.t_s) < GROUPS * FRAMES:
         return ()
@@ -114,14 +124,17 @@ def floor_lines(problem: Problem, fit: Fit) -> tuple[FloorLines, ...]:
     extent = max(float(np.ptp(passes.x)), float(np.ptp(passes.y)))
     step = math.radians(STEP_DEG)
     width = max(NARROWEST_M, extent * step, float(np.median(passes.way_m)))
-    seen = [(_alike(passes, angle, width), angle) for angle in np.arange(0.0, math.pi, step)]
     found: list[FloorLines] = []
-    for z, angle in sorted(seen, reverse=True):
-        if z < LEAST_Z or len(found) == 2:
+    while len(found) < MOST:
+        angles = [a for a in np.arange(0.0, math.pi, step) if all(_between(a, one.across_rad) > _APART_RAD for one in found)]
+        z, angle = max((_alike(passes, angle, width), angle) for angle in angles)
+        lines = _lines(passes, z, _closer(passes, angle, width, step), width / 2.0) if z >= LEAST_Z else None
+        if lines is None:
             break
-        if all(_between(angle, one.across_rad) > math.radians(APART_DEG) for one in found):
-            lines = _lines(passes, z, _closer(passes, angle, width, step), width / 2.0)
-            found += [lines] if lines is not None else []
+        found.append(lines)
+        passes = passes.but_at(lines, width)
+        if not len(passes.x):
+            break
     return tuple(found)
 
 

@@ -175,7 +175,7 @@ def _surface(term: Formula, predictor: Predictor) -> str:
     verb = {"w": "turns", "v": "drives"}.get(term.on, "is")
     if change[least] * change[most] > 0.0 and change[most] - change[least] < _FLAT * abs(float(np.median(change))):
         return f"the robot {verb} {said(float(np.median(change)))}, at nearly all speeds and turn rates alike"
-    at = [f"{said(float(change[i]))} at {v[i]:.2g} m/s with {np.degrees(w[i]):.0f} °/s" for i in (least, most)]
+    at = [f"{said(float(change[i]))} at {round(v[i], 3) + 0.0:.2g} m/s with {np.degrees(w[i]):.0f} °/s" for i in (least, most)]
     return f"the robot {verb} {', '.join(at)}"
 
 

@@ -62,6 +62,7 @@ class Residuals(CommandTimes):
         2.0, "°", "Lines whose direction differs from a coordinate's by less are said to be at values of it."
     )
     line_strip_frames: int = setting(4, "frames", f"A strip with fewer tells nothing; {BY_HAND}.")
+    line_most: int = setting(4, "directions", "Of lines in more directions than so many the surest are told.")
     line_shown: int = setting(6, "lines", "Most lines that are listed in a sentence.")
     least_alike: float = setting(
         0.06,

@@ -217,3 +217,14 @@ def test_a_diagnosis_says_where_they_are_and_names_them_where_they_are_evenly_sp
     assert values["spacing_m"] == pytest.approx(0.25, abs=0.001)
     assert values["loss_m"] == pytest.approx(0.005, abs=0.0004)
     assert (values["at_m"] - 0.1 + 0.125) % 0.25 - 0.125 == pytest.approx(0.0, abs=0.002)
+
+
+def test_lines_of_three_directions_are_all_found():
+    """Three cables on the floor, each of its own direction."""
+    cables = [(math.radians(12), 0.21), (math.radians(97), -0.13), (math.radians(151), 0.05)]
+    found = found_in(driven([(angle, 10.0, at) for angle, at in cables], 0.006, trials=60))
+    assert len(found) == 3
+    for angle, at in cables:
+        (one,) = (lines for lines in found if abs(math.remainder(lines.across_rad - angle, math.pi)) < math.radians(2.0))
+        turned = math.cos(one.across_rad - angle)  # the same line, counted from the other side
+        assert [turned * place for place in one.at_m] == pytest.approx([at], abs=0.015)
