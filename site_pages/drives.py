@@ -27,7 +27,7 @@ VALUES: dict[str, dict[str, float]] = {
     "acceleration-limit": {"max_m_s2": 0.3},
     "backlash": {"gap_m": 0.04},
     "backlash-start": {"gap_m": 0.04, "crossed_share": 0.0},
-    "backlash-mismatch": {"gap_m": 0.03, "left_share": 2.0},
+    "backlash-mismatch": {"gap_m": 0.03, "crossed_share": 1.0, "left_share": 2.0},
     "battery-sag": {"rate_per_s": -0.01, "per_volt": 0.0},
     "braking-lag": {"tau_s": 0.5, "brake_ratio": 0.2},
     "braking-limit": {"max_m_s2": 0.15, "brake_ratio": 4.0},

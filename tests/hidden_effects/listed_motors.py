@@ -273,19 +273,6 @@ class Backlash(Cause):
 
 
 @dataclass
-class BacklashMismatch(Cause):
-    """The same with a gap of its own on each side, of which the mean is given."""
-
-    gap_m: float
-    left_share: float
-
-    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
-        left = self.gap_m * self.left_share
-        sides = [Backlash(gap).wheels(wheels[..., i : i + 1], moment) for i, gap in enumerate((left, 2 * self.gap_m - left))]
-        return np.concatenate(sides, axis=-1)
-
-
-@dataclass
 class BacklashStart(Backlash):
     """The same, begun elsewhere in the gap."""
 
@@ -294,3 +281,18 @@ class BacklashStart(Backlash):
     @property
     def first_m(self) -> float:
         return self.crossed_share * self.gap_m
+
+
+@dataclass
+class BacklashMismatch(Cause):
+    """The same with a gap of its own on each side, of which the mean is given."""
+
+    gap_m: float
+    crossed_share: float
+    left_share: float
+
+    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        left = self.gap_m * self.left_share
+        gaps = left, 2 * self.gap_m - left
+        sides = [BacklashStart(gap, self.crossed_share).wheels(wheels[..., i : i + 1], moment) for i, gap in enumerate(gaps)]
+        return np.concatenate(sides, axis=-1)

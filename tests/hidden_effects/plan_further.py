@@ -20,7 +20,10 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
     ),
     "backlash": ({"gap_m": 0.004}, {"gap_m": 0.01}),
     "backlash-start": ({"gap_m": 0.004, "crossed_share": 0.0}, {"gap_m": 0.01, "crossed_share": 0.5}),
-    "backlash-mismatch": ({"gap_m": 0.003, "left_share": 2.0}, {"gap_m": 0.006, "left_share": 0.3}),
+    "backlash-mismatch": (
+        {"gap_m": 0.003, "crossed_share": 1.0, "left_share": 2.0},
+        {"gap_m": 0.006, "crossed_share": 0.5, "left_share": 0.3},
+    ),
     "caster-swing": ({"loss": 0.3, "trail_m": 0.03}, {"loss": 0.6, "trail_m": 0.05}),
     "caster-trail": (
         {"loss": 0.3, "trail_m": 0.015, "pivot_m": 0.0442},
@@ -137,6 +140,7 @@ ALIKE = {
     "wheel-patch": ("floor-patch", "uneven-patch"),
     "uneven-patch": ("floor-patch", "wheel-patch"),
     "floor-joints": ("floor-tiles",),
+    "backlash-start": ("backlash-mismatch",),
     "wheel-diameters": ("wheel-mismatch",),
     "overload-trip": ("supply-trip",),
     "supply-trip": ("overload-trip",),

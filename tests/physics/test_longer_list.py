@@ -52,7 +52,7 @@ def test_gears_that_touch_elsewhere_lose_their_way_at_the_start_as_well(crossed_
 @pytest.mark.parametrize(("left_share", "left_m", "right_m"), [(1.0, 0.01, 0.01), (2.0, 0.02, 0.0), (0.5, 0.005, 0.015)])
 def test_each_side_has_a_gap_of_its_own(left_share, left_m, right_m):
     """Backwards by 0.1 m: the wheel with more play has gone less far."""
-    model = IDEAL.with_effect("backlash-mismatch", gap_m=0.01, left_share=left_share)
+    model = IDEAL.with_effect("backlash-mismatch", gap_m=0.01, crossed_share=1.0, left_share=left_share)
     turned = simulate(model, STRAIGHT, STRAIGHT, np.ones((1, 3)))[0, 1, 2]
     assert turned == pytest.approx(((-0.1 + right_m) - (-0.1 + left_m)) / IDEAL.wheelbase_m)
 

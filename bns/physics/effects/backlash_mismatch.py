@@ -1,6 +1,6 @@
 """The gears of one side have more play than those of the other: a loose shaft, a worn gear.
 
-Where both have the same: `backlash`.
+Where both have the same: `backlash`, or `backlash-start`.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from bns.physics.effect import Effect, Parameter
-from bns.physics.effects.backlash import EFFECT as ALIKE
+from bns.physics.effects.backlash_start import EFFECT as ALIKE
 from bns.physics.signals import Wheels
 from bns.physics.wheels.scans import played
 
@@ -16,11 +16,15 @@ _NOTABLE = 0.05
 """Less play than this share of the other side's is told as none."""
 
 
-def apply(wheels: Wheels, gap_m: float, left_share: float) -> Wheels:
-    """At each change of its direction the left wheel loses ``left_share``·``gap_m``, the right one the rest of 2·``gap_m``."""
+def apply(wheels: Wheels, gap_m: float, crossed_share: float, left_share: float) -> Wheels:
+    """At each change of its direction the left wheel loses ``left_share``·``gap_m``, the right one the rest of 2·``gap_m``.
+
+    ``crossed_share`` of each gap is crossed already when a trial begins.
+    """
     left_m, right_m = gap_m * left_share, gap_m * (2.0 - left_share)
     return wheels.turning(
-        played(wheels.left_m_s, wheels.step_s, left_m, left_m), played(wheels.right_m_s, wheels.step_s, right_m, right_m)
+        played(wheels.left_m_s, wheels.step_s, left_m, crossed_share * left_m),
+        played(wheels.right_m_s, wheels.step_s, right_m, crossed_share * right_m),
     )
 
 
@@ -50,16 +54,17 @@ EFFECT = Effect(
             reached=(0.0, 2.0),
         ),
     ),
-    equation="as backlash, with the gap g·gap on the left and (2 - g)·gap on the right",
+    equation="as backlash-start, with the gap g·gap on the left and (2 - g)·gap on the right",
     residuals="After each reversal of one wheel the robot has turned by a fixed angle more or less, at any speed; trials without "
     "reversals fit.",
-    lookalikes=("backlash", "yaw-bias", "lag-mismatch"),
+    lookalikes=("backlash", "backlash-start", "yaw-bias", "lag-mismatch"),
     sentence="play in the gears stops one wheel for longer than the other whenever it changes direction",
     sized_by=sized_by,
     measurement="hold each motor still, turn its wheel by hand, and measure the play at either rim",
-    assumes="backlash-mismatch: the gears are assumed to touch in the forward direction when a trial begins. If the robot drove "
-    "backwards or was pushed before, the gaps are estimated too small: let it drive forward a little before each trial.",
+    assumes="backlash-mismatch: the gears are assumed to lie at one place of their gaps whenever a trial begins. Let the robot "
+    "drive forward a little before each trial, and they touch forwards.",
     apply=apply,
     needs="track",
     extends="backlash",
+    contains=("backlash-start",),
 )

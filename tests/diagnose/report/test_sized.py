@@ -41,11 +41,11 @@ JOINTS = {name: number(0.01) for name in ("across_rad", "at_m", "over_m")}
             "the right wheel runs no faster than 100 mm/s, the other one may run faster",
         ),
         (
-            *("backlash-mismatch", {"gap_m": number(0.003), "left_share": number(0.5, 0.4, 0.6)}),
+            *("backlash-mismatch", {"gap_m": number(0.003), "crossed_share": number(1.0), "left_share": number(0.5, 0.4, 0.6)}),
             "play in the gears stops the right wheel for 4.5 mm of its way whenever it changes direction, and",
         ),
         (
-            *("backlash-mismatch", {"gap_m": number(0.003), "left_share": number(1.98, 1.9, 2.0)}),
+            *("backlash-mismatch", {"gap_m": number(0.003), "crossed_share": number(1.0), "left_share": number(1.98, 1.9, 2.0)}),
             "play in the gears stops the left wheel for 5.9 mm of its way whenever it changes direction, and t",
         ),
         (
