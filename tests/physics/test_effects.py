@@ -21,7 +21,7 @@ from bns.physics.wheels.scans import delayed
 from bns.registry import EFFECTS
 
 SIGNALS = dict(zip(STAGES, (Wheels, Body, Flow, Stamps, View), strict=True))
-PLACES = {"x_m", "y_m", "spacing_m", "at_m", "second_at_m"}
+PLACES = {"x_m": 0.0, "y_m": 0.0, "spacing_m": 0.1, "at_m": 0.0, "second_at_m": 0.0}
 """Of a place: any may be."""
 IDEAL = Model(wheelbase_m=0.0884)
 LEFT = np.array([[0.09, 0.20, -0.05, 0.02], [0.15, 0.0, 0.07, 0.0], [0.2, 0.2, 0.1, 0.15]])
@@ -34,7 +34,7 @@ every_effect = pytest.mark.parametrize("effect", all_effects().values(), ids=all
 def plausible_model(effect):
     """The effect at the plausible end that is farther from neutral."""
     ends = {p.name: max(p.plausible, key=lambda v, p=p: abs(v - p.neutral)) for p in effect.parameters}
-    ends |= {p.name: p.neutral for p in effect.parameters if p.name in PLACES}
+    ends |= {p.name: PLACES[p.name] for p in effect.parameters if p.name in PLACES}
     limits = [p for p in effect.parameters if np.isinf(p.neutral)]
     ends |= {p.name: min(p.plausible) for p in limits}
     return IDEAL.with_effect(effect.name, **ends)

@@ -15,6 +15,9 @@ from bns.physics.effect import Effect, Parameter
 from bns.physics.signals import Body, Wheels
 from bns.physics.wheels.joints import Joints, crossed, rows_of_joints
 
+_NOWHERE_M = 100.0
+"""Joints so far apart, none of them near: a robot crosses none. Where nothing stands out, a fit begins there, and ends there."""
+
 
 def apply(body: Body, spacing_m: float, across_rad: float, at_m: float, loss_m: float, over_m: float) -> Body:
     """Each wheel's way is shorter by ``loss_m`` wherever it crosses a line, over ``over_m`` across it."""
@@ -58,7 +61,15 @@ EFFECT = Effect(
     stage="body",
     parameters=(
         Parameter(
-            "spacing_m", "m", 0.02, 100.0, (0.05, 2.0), 0.1, "distance between neighbouring joints", resolution=5e-4, jagged=True
+            "spacing_m",
+            "m",
+            0.02,
+            _NOWHERE_M,
+            (0.05, 2.0),
+            _NOWHERE_M,
+            "distance between neighbouring joints",
+            resolution=5e-4,
+            jagged=True,
         ),
         Parameter(
             "across_rad",
@@ -77,7 +88,7 @@ EFFECT = Effect(
             -1e3,
             1e3,
             (-1.0, 1.0),
-            0.0,
+            _NOWHERE_M / 2.0,
             "where one of them is, from the origin in that direction",
             resolution=1e-3,
             jagged=True,
