@@ -42,7 +42,7 @@ EFFECT = Effect(
             1.0,
             (0.0, 1.0),
             1.0,
-            "share of the gap that is crossed when a trial begins (1: the gears touch forwards, 0: backwards)",
+            "fraction of the gap that is crossed when a trial begins (1: the gears touch forwards, 0: backwards)",
             reached=(0.0, 1.0),
         ),
     ),
