@@ -8,6 +8,7 @@ JOBS    ?=
 ONLY    ?=
 DATA    ?=
 FROM    ?=
+PART    ?=
 STAMP   := $(VENV)/.installed
 # The CPU build: a tagged wheel where one is at hand, else from PyTorch's own index. Never the CUDA packages.
 TORCH   := torch==2.13.0
@@ -33,8 +34,8 @@ $(STAMP): pyproject.toml setup.py constraints.txt
 test: setup ## the tests, all but the slow ones
 	$(BIN)/python -m pytest -n 3 --dist worksteal -q -m "not slow"
 
-test-slow: setup ## the tests that go end to end or over many cases; with make test these are all
-	$(BIN)/python -m pytest -n 2 --dist worksteal -q -m slow
+test-slow: setup ## the tests that go end to end or over many cases; with make test these are all. PART=1/2: half of them
+	$(BIN)/python -m pytest -n 2 --dist worksteal -q -m slow $(if $(PART),--part $(PART))
 
 lint: setup ## style and types
 	$(BIN)/ruff check .

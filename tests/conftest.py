@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import zlib
 
 import hypothesis
 import matplotlib as mpl
@@ -20,6 +21,25 @@ ANSWERS = "BNS_TEST_ANSWERS"
 if ANSWERS not in os.environ:  # the workers of pytest-xdist inherit it
     os.environ[ANSWERS] = tempfile.mkdtemp(prefix="bns-answers-")
     atexit.register(shutil.rmtree, os.environ[ANSWERS], ignore_errors=True)
+
+
+def pytest_addoption(parser):
+    parser.addoption("--part", metavar="K/N", help="only every N-th test, beginning with the K-th: a part of a long suite")
+
+
+def pytest_collection_modifyitems(config, items):
+    if part := config.getoption("--part"):
+        kept = [item for item in items if in_part(item.nodeid, part)]
+        config.hook.pytest_deselected(items=[item for item in items if not in_part(item.nodeid, part)])
+        items[:] = kept
+
+
+def in_part(name, part):
+    """Whether a test belongs to the K-th of N parts ("K/N"): by its name, so that others come and go beside it."""
+    which, of = (int(number) for number in part.split("/"))
+    if not 1 <= which <= of:
+        raise pytest.UsageError(f"--part {part}: there are the parts 1/{of} to {of}/{of}")
+    return zlib.crc32(name.encode()) % of == which - 1
 
 
 def remembering():
