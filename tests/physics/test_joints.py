@@ -61,7 +61,7 @@ def test_tiles_have_a_second_row_across_the_first():
 
 def test_how_many_joints_lie_behind():
     row = Joints(0.0, 0.1, 0.02, 0.01)
-    behind = row.passed(np.array([0.0, 0.02, 0.0225, 0.05, 0.12, 0.125, 0.21]), np.zeros(7))
+    behind = row.passed(np.array([0.0, 0.02, 0.0225, 0.05, 0.12, 0.125, 0.21]))
     assert behind - behind[0] == pytest.approx([0.0, 0.5, 0.75, 1.0, 1.5, 2.0, 2.0])
 
 

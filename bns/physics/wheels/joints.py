@@ -18,8 +18,8 @@ _CELLS = 256
 """The floor is a map of so many cells a side, of which the power spectrum is taken."""
 _RINGS = 24
 _CERTAIN = 14.0
-"""Power of a peak, in mean powers at that wavelength. By chance the largest of the some 30,000 is exp(-10) rare at 10; beyond 14
-in 3 of 100 logs. A false one costs a fit, since what is found here only begins one."""
+"""Power of a peak, in mean powers at that wavelength. Of some 30,000 independent powers one is beyond 14 by chance in 3 of 100
+logs. A false one costs a fit, since what is found here only begins one."""
 _PEAKS, _HARMONICS, _FINER = 6, 4, 4
 _FEWEST, _MOST = 200, 20_000
 _ROWS = 3
@@ -38,9 +38,9 @@ class Joints:
     at_m: float
     over_m: float = _OVER_M
 
-    def passed(self, x_m: Array, y_m: Array) -> Array:
-        """How many joints lie behind a point, counted from one of them; in between while it is on one."""
-        along = (x_m * np.cos(self.across_rad) + y_m * np.sin(self.across_rad) - self.at_m) / self.spacing_m
+    def passed(self, along_m: Array) -> Array:
+        """How many joints lie behind places along the direction across, counted from one of them; in between while on one."""
+        along = (along_m - self.at_m) / self.spacing_m
         nearest = np.round(along)
         out: Array = nearest + np.clip((along - nearest) * max(self.spacing_m / self.over_m, 1.0), -0.5, 0.5)
         return out
@@ -205,8 +205,8 @@ def _loss(ways: _Ways, row: Joints) -> float:
     """The way lost at each, by least squares beside what is lost everywhere; 0 where not several joints lose as much."""
     middle = ways.x * np.cos(row.across_rad) + ways.y * np.sin(row.across_rad)
     reach = ways.told * np.abs(np.cos(ways.heading - row.across_rad)) / 2.0
-    crossings = (_behind(row, middle + reach) - _behind(row, middle - reach)).clip(0.0)
-    own = crossings - ways.told * float(ways.told @ crossings) / max(float(ways.told @ ways.told), 1e-12)
+    times = (row.passed(middle + reach) - row.passed(middle - reach)).clip(0.0)
+    own = times - ways.told * float(ways.told @ times) / max(float(ways.told @ ways.told), 1e-12)
     which = np.round((middle - row.at_m) / row.spacing_m).astype(np.int64)
     which -= which.min()
     often, lost = np.bincount(which, own**2), np.bincount(which, own * ways.lost)
@@ -214,8 +214,3 @@ def _loss(ways: _Ways, row: Joints) -> float:
     known = often > _OFTEN * often.max()
     alike = known & (lost / np.maximum(often, 1e-12) * np.sign(loss) > _AS_MUCH * abs(loss))
     return loss if alike.sum() >= max(_FEWEST_JOINTS, (1.0 - _MISSING) * known.sum()) else 0.0
-
-
-def _behind(row: Joints, along_m: Array) -> Array:
-    """`Joints.passed` of places given along the direction across."""
-    return row.passed(along_m * np.cos(row.across_rad), along_m * np.sin(row.across_rad))
