@@ -25,6 +25,11 @@ def yaw(values: pd.DataFrame, up: str) -> pd.Series:
     return pd.Series(np.where(none, np.nan, np.arctan2(left, ahead)), index=values.index)
 
 
+def y_is_up(numbers: np.ndarray) -> bool:
+    """Whether bodies with these quaternions (n, 4) are upright if the tracker's y axis points up, and less so if z does."""
+    return _tilt_rad(numbers, "y") <= min(_UPRIGHT_RAD, _tilt_rad(numbers, "z"))
+
+
 def _check_upright(numbers: np.ndarray, names: list[str], up: str) -> None:
     """DataError if the axis of the body that should point up does not, in the median; it says how it would."""
     tilt = _tilt_rad(numbers, up)

@@ -50,7 +50,7 @@ class Checks:
     largest_number: float = setting(1e30, "1", "Larger numbers are not measurements: their squares overflow.")
     most_columns: int = setting(2_000, "columns", f"A table with more columns is not the log of a robot; {BY_HAND}.")
     longest_line: int = setting(1 << 20, "characters", f"A longer first line is not the heading of a table; {BY_HAND}.")
-    head_lines: int = setting(200, "lines", f"A longer block of comments above a table is not a heading; {BY_HAND}.")
+    head_lines: int = setting(200, "lines", f"A longer block of lines above a table is not a heading; {BY_HAND}.")
     bag_largest_bytes: int = setting(
         4096,
         "bytes",

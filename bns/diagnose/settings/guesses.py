@@ -57,6 +57,37 @@ class Guesses:
         "as long as any other time between rows, and if there are at least so many of them (the second one) for each time that "
         f"the robot stands: a tracker that failed once cuts no log; {BY_HAND}.",
     )
+    guess_flat: float = setting(
+        0.2,
+        "1",
+        "A tracker's y axis is proposed to point up, where no quaternion tells, if its poses spread along it by less than "
+        f"this part of their spread along z: a floor is flat to some mm; {BY_HAND}.",
+    )
+    guess_clock_s: float = setting(
+        1.0,
+        "s",
+        "Clocks of two files are said to differ if the speeds driven follow those commanded by more than this: robots lag by "
+        f"some tenths of a second; {BY_HAND}.",
+    )
+    guess_clock_step_s: float = setting(
+        0.05, "s", f"Time step at which speeds driven and commanded are compared to join two clocks; {BY_HAND}."
+    )
+    guess_clock_half_s: float = setting(
+        0.2, "s", f"Speeds driven are differences of positions from so long before to so long after; {BY_HAND}."
+    )
+    guess_clock_lasts_s: tuple[float, float] = setting(
+        (10.0, 100_000.0),
+        "s",
+        "Clocks of files that last less, or longer, are not compared: a few commands fit anywhere, and numbers that reach over "
+        f"more than a day are hardly times; {BY_HAND}.",
+    )
+    guess_clock_agree: tuple[float, float] = setting(
+        (0.7, 2.0),
+        "1",
+        "The difference between two clocks is proposed where the correlation of speeds driven and commanded is at least the "
+        "first number, and any other shift leaves at least so many times (the second one) its variance unexplained: commands "
+        f"that repeat themselves fit at several; {BY_HAND}.",
+    )
     guess_degrees: float = setting(
         90.0,
         "number",

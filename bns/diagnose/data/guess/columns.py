@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from bns.diagnose.data.guess.numbers import heading_convention, unit_of_positions, unit_of_speeds
+from bns.diagnose.data.guess.upwards import with_up
 from bns.diagnose.data.guess.words import (
     QUATERNIONS,
     WORDS,
@@ -44,6 +45,7 @@ def of_columns(table: pd.DataFrame) -> dict[str, Any]:
     entries |= _entries(table, POSE, _without(free, entries))
     if quaternion is not None:
         entries["heading_rad"] = {"from": quaternion, "unit": "quaternion"}
+    entries = with_up(table, entries)
     lengths = unit_of_positions(table, entries)
     entries |= {name: {**entries[name], **lengths} for name in ("x_m", "y_m") if lengths}
     by_numbers = unit_of_speeds(table, entries)

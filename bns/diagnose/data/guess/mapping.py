@@ -10,6 +10,7 @@ from typing import Any
 import pandas as pd
 import yaml
 
+from bns.diagnose.data.guess.clocks import Clocks, clocks
 from bns.diagnose.data.guess.columns import METRES_A_COUNT, RADIUS, motions_of, of_columns, rank_of_commands
 from bns.diagnose.data.guess.numbers import (
     LARGEST_M,
@@ -89,6 +90,12 @@ def guessed(table: pd.DataFrame, others: Mapping[str, pd.DataFrame] | None = Non
     found = {file: _entries(one) for file, one in tables.items()}
     poses = _best(found, POSE, truth=True)
     told = _best(found, _commands_in(found), truth=False)
+    joined = None
+    if poses is not None and told is not None and poses != told:
+        joined = clocks((tables[poses], found[poses]), (tables[told], found[told]))
+        if joined is not None:
+            moved, sign = (told, 1) if poses == name else (poses, -1)
+            found[moved] = {**found[moved], "t_s": {**found[moved]["t_s"], "offset": sign * joined.offset_s}}
     kept = {file: _part(entries, file == poses, file == told) for file, entries in found.items()}
     tree: dict[str, Any] = {"columns": kept.pop(name)}
     also = [{"file": file, "columns": entries} for file, entries in kept.items() if set(entries) > {"t_s"}]
@@ -102,7 +109,26 @@ def guessed(table: pd.DataFrame, others: Mapping[str, pd.DataFrame] | None = Non
     if "trial" not in everything:
         read = [name, *(str(one["file"]) for one in also)]
         tree["trials"] = cut_into_trials(tables[told or name], found[told or name], [(tables[f], found[f]) for f in read])
-    return Guess(tree, tuple(_remarks(everything, tables)), tuple(_blanks(everything, tables)))
+    said = [*_remarks(everything, tables), *([_of_clocks(joined)] if joined else []), *_other_bodies(everything, tables)]
+    return Guess(tree, tuple(said), tuple(_blanks(everything, tables)))
+
+
+def _of_clocks(joined: Clocks) -> str:
+    return (
+        f"The clocks of the two files differ by {abs(joined.offset_s):.2f} s, by where the speeds driven fit those commanded "
+        f"(correlation {joined.correlation:.2f}). A lag of the robot is part of this number: trust no lag and no clock-offset "
+        "that is found later, unless you replace it by a time that both clocks saw."
+    )
+
+
+def _other_bodies(entries: Entries, tables: Mapping[str, pd.DataFrame]) -> Iterator[str]:
+    """Bodies beside the one whose poses are taken, by columns that have its names but for the body's."""
+    taken = str(entries.get("x_m", {}).get("from", ""))
+    body, dot, rest = taken.partition(".")
+    names = [str(c) for table in tables.values() if taken in table for c in table.columns]
+    others = [name[: -len(dot + rest)] for name in names if dot and name.endswith(dot + rest) and name != taken]
+    if others and not taken.startswith("/"):  # a topic has its own rules
+        yield f"The poses are those of {body}; the file has {', '.join(others[:FREE_SHOWN])}, too. Name the robot's."
 
 
 def lacking(mapping: Mapping[str, Any]) -> tuple[str, ...]:

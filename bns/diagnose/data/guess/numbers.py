@@ -170,9 +170,13 @@ def _columns(table: pd.DataFrame, entries: Mapping[str, Any], names: tuple[str, 
     """These columns in SI units, the commands as they are; None where one is missing or is made of several."""
     if not set(names) <= set(entries) or any(not isinstance(entries[name]["from"], str) for name in names):
         return None
-    return [_in_si(table, entries[name], name not in {*COMMANDS, FORWARD}) for name in names]
+    return [in_si(table, entries[name], name not in {*COMMANDS, FORWARD}) for name in names]
 
 
-def _in_si(table: pd.DataFrame, entry: Mapping[str, Any], with_unit: bool) -> np.ndarray:
+def in_si(table: pd.DataFrame, entry: Mapping[str, Any], with_unit: bool) -> np.ndarray:
+    """An entry's column, scaled and moved as it says, in SI units or as it is; NaN where no number stands."""
     numbers = pd.to_numeric(table[entry["from"]], errors="coerce").to_numpy(float)
-    return numbers * (SIZES[entry["unit"]] if with_unit and "unit" in entry else 1.0)
+    scale = entry.get("scale", 1.0)
+    known = 1.0 if isinstance(scale, str) else float(scale)  # a word stands where a number is to be filled in
+    size = SIZES[entry["unit"]] if with_unit and "unit" in entry else 1.0
+    return numbers * known * size + float(entry.get("offset", 0.0))

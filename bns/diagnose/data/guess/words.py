@@ -16,10 +16,13 @@ WORDS: dict[str, tuple[str, ...]] = {
     TURN: ("omega", "angular z", "w", "wz", "yaw rate", "yawrate", "angular velocity", "turn rate"),
     "x_m": ("position x", "pos x", "px", "tx", "x"),
     "y_m": ("position y", "pos y", "py", "ty", "y"),
-    "heading_rad": ("yaw", "heading", "theta", "psi", "compass", "orientation"),
+    "heading_rad": ("yaw", "heading", "theta", "psi", "compass", "orientation", "rotation z", "rz"),
 }
 """Column of the table -> words that its sources have in their names, the surer first."""
-QUATERNIONS = (("qx", "qy", "qz", "qw"), tuple(f"orientation {axis}" for axis in "xyzw"))
+QUATERNIONS = (
+    *(tuple(f"{letter}{axis}" for axis in "xyzw") for letter in "qr"),
+    *(tuple(f"{word} {axis}" for axis in "xyzw") for word in ("orientation", "rotation")),
+)
 _TRUTH: tuple[str, ...] = (
     *("ground truth", "groundtruth", "truth", "gt", "mocap", "vrpn", "optitrack", "vicon", "qualisys", "tracker"),
     *("aruco", "apriltag", "lidar", "icp", "slam", "amcl", "map", "world"),

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from bns.diagnose.data.sources.motion_capture import is_motion_capture, read_motion_capture
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 from bns.measurements import COLUMNS
@@ -36,6 +37,8 @@ def read_text_table(path: Path) -> pd.DataFrame:
     Lines that begin with ``#`` or ``%`` are comments; the last one before the numbers that has as many names as there are
     columns is the heading. Without one, and with numbers in the first line, columns are column_1, column_2, ...
     """
+    if is_motion_capture(path):
+        return read_motion_capture(path)
     comments, first, second = _head(path)
     separator = _separator(first, path)
     decimal = _decimal(separator, second or first)
