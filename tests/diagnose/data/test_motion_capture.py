@@ -128,6 +128,16 @@ def test_a_take_of_motive_is_read_by_its_own_proposal(tmp_path, log, version, ta
     assert out.trials == 8
 
 
+@pytest.mark.parametrize("up", ["y", "z"])
+def test_the_axis_that_points_up_is_told_even_where_the_robot_hardly_turned(tmp_path, log, up):
+    """Within 20 degrees of one direction it is upright about either axis, by the limit for robots on a floor."""
+    straight = log.assign(heading_rad=0.35 * np.sin(log["heading_rad"]))
+    motive(straight, tmp_path / "take.csv", up=up)
+    entries = guessed(read_table(tmp_path / "take.csv")).mapping["columns"]
+    assert entries["heading_rad"].get("up", "z") == up
+    assert entries["y_m"] == {"y": {"from": "robot.position.z [m]", "scale": -1}, "z": {"from": "robot.position.y [m]"}}[up]
+
+
 def test_the_clocks_of_the_files_are_joined_where_the_speeds_fit(tmp_path, log):
     """By 10 ms, though the two count from other origins; the robot of this log has no lag."""
     motive(log, tmp_path / "take.csv.gz")
