@@ -81,34 +81,38 @@ def _killed_and_unplugged(to):
     os.kill(to.process, signal.SIGKILL)
 
 
-def _held(seconds, slept_s=0.0):
-    """Trial and guard stand still together, as on a computer that sleeps, and go on; the clock says how long it slept."""
+def _both_stopped(to):
+    for process in (guard_of(to.process, to.robot.path), to.process):  # the guard first: else it would see that of the trial
+        os.kill(process, signal.SIGSTOP)
 
-    def cause(to):
-        both = guard_of(to.process, to.robot.path), to.process  # a guard that still runs would see that the trial is stopped
-        for process in both:
-            os.kill(process, signal.SIGSTOP)
-        time.sleep(seconds)
-        if slept_s:
-            written = to.slept.with_suffix(".new")
-            written.write_text(str(slept_s + (float(to.slept.read_text()) if to.slept.exists() else 0.0)))
-            written.replace(to.slept)
-        for process in both:
-            os.kill(process, signal.SIGCONT)
 
-    return cause
+def _asleep(to):
+    """Trial, guard and who stands by stand still together, as on a computer that sleeps; the clock says for how long."""
+    processes = [*_children(to.process), to.process]
+    for process in processes:
+        os.kill(process, signal.SIGSTOP)
+    time.sleep(0.02)
+    written = to.slept.with_suffix(".new")
+    written.write_text(str(600.0 + (float(to.slept.read_text()) if to.slept.exists() else 0.0)))
+    written.replace(to.slept)
+    for process in processes:
+        os.kill(process, signal.SIGCONT)
+
+
+def _children(process):
+    return [int(child) for child in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
 
 
 def guard_of(process, port):
     """The process number of a trial's guard: the child that has the port open. Another one stands by."""
     port = os.path.realpath(port)
-    for child in Path(f"/proc/{process}/task/{process}/children").read_text().split():
+    for child in _children(process):
         if any(os.path.realpath(file) == port for file in Path(f"/proc/{child}/fd").iterdir()):
-            return int(child)
+            return child
     raise AssertionError("the trial has no guard")
 
 
-HELD, SLEPT = "trial and guard stopped for a second", "the computer slept"
+HELD, SLEPT = "trial and guard stopped together", "the computer slept"
 SUSPENDS = {"Ctrl-Z", "SIGTSTP"}
 CAUSES = {
     "SIGKILL": _signalled(signal.SIGKILL),
@@ -128,8 +132,9 @@ CAUSES = {
     "link gone, then SIGKILL": _killed_and_unplugged,
     "the guard is killed": _guard_signalled(signal.SIGKILL),
     "the guard is terminated": _guard_signalled(signal.SIGTERM),
-    HELD: _held(1.0),
-    SLEPT: _held(0.02, 600.0),
+    "the guard is stopped": _guard_signalled(signal.SIGSTOP),
+    HELD: _both_stopped,
+    SLEPT: _asleep,
 }
 _ARMED_S = 4.0
 """By then the servos have their torque and the body is straight; before, nothing depends on the camera."""
@@ -167,7 +172,7 @@ def _befell(nursery, robot, cause, folder, gone_s, patient):
         time.sleep(_ARMED_S if cause.startswith("camera") and robot.link != "serial" else 0.25)
         began_s = time.monotonic()
         CAUSES[cause](Befalls(robot, process, terminal, nursery.slept))
-        if cause in {HELD, SLEPT}:
+        if cause == SLEPT:
             began_s = time.monotonic()
         alone_s = float("nan")
         if cause in GONE_S:
@@ -203,6 +208,8 @@ def _end(nursery, cause, process, terminal):
         if cause == "SIGSTOP":
             assert "stopped" in nursery.heard()
         os.kill(process, signal.SIGKILL)
+    if cause == HELD:
+        os.kill(process, signal.SIGCONT)
     if cause in SUSPENDS:
         assert end_of(nursery, terminal) == {"stopped": signal.SIGTSTP}
         os.kill(process, signal.SIGCONT)

@@ -22,6 +22,8 @@ from bns.errors import HardwareError, StopNotConfirmedError
 from bns.hardware.clock import RealClock
 from bns.hardware.guard.holder import CODE
 from bns.hardware.guard.recipe import StopRecipe
+from bns.hardware.guard.signs import STOPPED, not_running
+from bns.hardware.guard.standby import ENDED
 from bns.hardware.link.serial_link import no_port, why_not_opened
 from bns.hardware.platform import Driven, Platform
 from bns.hardware.safety import Stopping
@@ -30,7 +32,10 @@ from bns.hardware.stop import Stop
 _FOLDER = Path(__file__).parent
 _BEAT_S = 0.02
 _READY_S = 10.0
+_HERE_S = 1.0
+"""So long who stands by may take to say that it has taken over; then it is replaced: it was stopped, or killed as well."""
 _ENDS_S = 2.0
+_AGAIN_S = 1.0
 _SLICE_S = 0.05
 
 
@@ -60,8 +65,6 @@ class _Process(NamedTuple):
                 start_new_session=True,
                 pass_fds=inherited,
             )
-        if watched is not None:
-            watched.close()
         return cls(process, control, watch)
 
     def say(self, what: bytes) -> None:
@@ -84,10 +87,10 @@ class _Process(NamedTuple):
 class Guard:
     """Starts the process, tells it that the trial lives, and hears when it has stopped the robot.
 
-    `path` is the port to give to the robot's driver. A trial that gives no sign of life for `silent_s` is taken to hang. What the
-    guard does is written into `log`. A guard that has died is replaced by one that stands by, which stops the robot at once. One
-    whose trial is gone goes on trying to stop the robot until that has not been heard for `gives_up_s`. `sysfs` is where the
-    system tells which device a port is.
+    `path` is the port to give to the robot's driver. A trial that gives no sign of life for `silent_s` is taken to hang. What
+    the guard does is written into `log`. A guard that was killed or stopped is replaced by one that stands by, which stops the
+    robot at once; who stands by is replaced, too. One whose trial is gone goes on trying to stop the robot until that has not
+    been heard for `gives_up_s`. `sysfs` is where the system tells which device a port is.
     """
 
     def __init__(
@@ -102,7 +105,8 @@ class Guard:
         self._port, self._recipe, self._log = port, recipe, log
         self._setup: dict[str, Any] = {"silent_s": silent_s, "gives_up_s": gives_up_s, "sysfs": sysfs, "identity": None}
         self.path = ""
-        self._armed, self._told_s, self._tried_s = False, 0.0, 0.0
+        self._armed, self._told_s, self._tried_s, self._replaced_s = False, 0.0, 0.0, 0.0
+        self._stopped = False
         self._why: str | None = None
         self._next: _Process | None = None
         if not Path(port).exists():
@@ -111,9 +115,9 @@ class Guard:
         self._next = self._standing_by()
 
     def _standing_by(self) -> _Process:
-        """A process that takes over by itself where the guard and this one are killed."""
+        """A process that takes over by itself where the guard is lost."""
         begun = _Process.begun(self._watch)
-        begun.say((json.dumps(self._told() | {"standby": True}) + "\n").encode())
+        begun.say((json.dumps(self._told() | {"standby": True, "guard": self._process.pid}) + "\n").encode())
         if self._armed:
             begun.say(b"a")
         return begun
@@ -134,16 +138,8 @@ class Guard:
         self._setup["identity"] = answer["identity"]
 
     def _begin(self, folder: Path) -> dict[str, Any]:
-        """What the process that stands by answers to its set-up; if that was killed as well, what a new one answers."""
-        standby, self._next = self._next, None
-        if standby is not None:
-            with suppress(OSError, HardwareError):
-                return self._set_up(standby, folder)
-            standby.end()
-        return self._set_up(_Process.begun(), folder)
-
-    def _set_up(self, begun: _Process, folder: Path) -> dict[str, Any]:
-        self._process, self._control, self._watch = begun
+        """What a new process answers to its set-up."""
+        self._process, self._control, self._watch = _Process.begun()
         self._said = b""
         folder.mkdir(exist_ok=True)
         self._control.sendall((json.dumps(self._told()) + "\n").encode())
@@ -180,15 +176,19 @@ class Guard:
         now_s = time.monotonic()
         if now_s - self._told_s >= _BEAT_S:
             self._told_s = now_s
+            before, self._stopped = self._stopped, not_running(self._process.pid) == STOPPED
+            if before and self._stopped:
+                self._process.kill()  # who stands by takes over
             self._tell(b".")
             self._listen()
+            self._keep_next()
 
     def arm(self) -> None:
         """The robot may move from now on."""
         self._armed = True
-        self._tell(b"a")
-        if self._next is not None:
+        if self._next is not None:  # first: a robot that stands is stopped rather than one that moves left alone
             self._next.say(b"a")
+        self._tell(b"a")
 
     def still(self) -> None:
         """It was confirmed to stand."""
@@ -209,15 +209,18 @@ class Guard:
 
     def close(self) -> bool:
         """Say goodbye; whether the guard has ended. One that goes on is still trying to stop the robot."""
-        self._tell(b"g")
+        self._listen()
+        if self._next is not None:
+            self._next.end()
+            self._next = None
+        with suppress(OSError):
+            self._control.send(b"g")
         self._control.close()
         self._watch.close()
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(_ENDS_S)
         ended = self._process.returncode is not None
         self._process.returncode = 0 if not ended else self._process.returncode  # it outlives this process on purpose
-        if self._next is not None:
-            self._next.end()
         return ended
 
     def _tell(self, what: bytes) -> None:
@@ -229,7 +232,7 @@ class Guard:
             self._restart()
 
     def _listen(self) -> None:
-        if not select.select([self._control], [], [], 0)[0]:
+        if self._control.fileno() < 0 or not select.select([self._control], [], [], 0)[0]:
             return
         try:
             said = self._control.recv(4096)
@@ -244,21 +247,54 @@ class Guard:
             if event["kind"] == "tripped":
                 self._why = self._why or f"the guard stopped the robot: {event['why']}"
 
+    def _keep_next(self) -> None:
+        """Replace who stands by, if it was killed."""
+        if self._next is None or time.monotonic() - self._replaced_s < _AGAIN_S:
+            return
+        try:
+            said = self._next.control.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT)
+        except BlockingIOError:
+            return
+        except OSError:
+            said = b""
+        if not said:
+            self._replaced_s = time.monotonic()
+            self._next.end()
+            self._next = self._standing_by()
+
     def _restart(self) -> None:
-        """The guard was killed: a new one takes the port, and the drive ends."""
-        self._why = "the guard of the robot's port had ended"
-        if time.monotonic() - self._tried_s < 1.0:
+        """The guard is lost, and the drive ends: who stood by has the port; if that was lost as well, a new process takes it."""
+        self._why = ENDED
+        if time.monotonic() - self._tried_s < _AGAIN_S:
             return
         self._tried_s = time.monotonic()
         self._control.close()
         self._watch.close()
+        self._process.kill()
         self._process.wait(_READY_S)
-        with suppress(HardwareError):  # then the driver finds no port, and says so
-            self._start()
-            if self._armed:
-                self.arm()
-                self.stop_now()  # the driver's own stop waits for its next look, and for the port to be opened again
-            self._next = self._standing_by()
+        standby, self._next = self._next, None
+        if standby is None or not self._adopted(standby, _HERE_S):
+            begun = _Process.begun()
+            begun.say((json.dumps(self._told() | {"lost": {"why": self._why, "armed": self._armed}}) + "\n").encode())
+            if not self._adopted(begun, _READY_S):
+                return  # the driver finds no port, and says so
+        self._next = self._standing_by()
+
+    def _adopted(self, begun: _Process, within_s: float) -> bool:
+        """Whether a process says in time that it stops the robot; it is the guard then, and else it is killed."""
+        self._process, self._control, self._watch = begun
+        self._said = b""
+        with suppress(OSError):  # TimeoutError, too
+            self._control.settimeout(within_s)
+            self._said = self._control.recv(4096)
+        if self._said:
+            self._control.setblocking(False)
+            return True
+        begun.process.kill()
+        begun.process.wait(_READY_S)
+        self._control.close()
+        self._watch.close()
+        return False
 
 
 class GuardedClock(RealClock):

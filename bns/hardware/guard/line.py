@@ -84,6 +84,7 @@ class Line:
         for line in (self.port, self.near):
             self._poll.register(line, select.POLLIN)
         with contextlib.suppress(OSError):
+            self._link.parent.mkdir(mode=0o700, exist_ok=True)
             new = self._link.with_suffix(".new")
             new.unlink(missing_ok=True)
             new.symlink_to(os.ttyname(self._far))

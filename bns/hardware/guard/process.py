@@ -5,8 +5,9 @@ trial. So this module and those that it imports (relatively: its folder is a pac
 Standard input is the control socket: first a line of JSON (the set-up), then single bytes: `.` a heartbeat, `a` the robot may
 move from now on, `s` it was confirmed to stand, `t` stop it now, `g` goodbye. Answers are lines of JSON.
 
-A process whose set-up says so stands by until it gets another one. It hears `a`, `s` and `g`, too, and over a socket of their own
-whether the process that guards ends (`d`) or is killed. Where the trial is gone as well, it takes over by itself.
+A process whose set-up says so stands by. It hears `a`, `s` and `g`, too, and over a socket of their own signs of life of the
+process that guards (`.`), and its end (`d`). Where that one was killed or stopped, or hangs, it takes over by itself, at once and
+whatever the trial does, and stops the robot; a trial that lives finds it behind the same sockets and the same link.
 """
 
 from __future__ import annotations
@@ -21,13 +22,13 @@ import socket
 import sys
 import time
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from .line import Line, OtherDeviceError
 from .order import StopOrder
-from .signs import GONE, GONE_BOTH, not_running, slept_s
+from .signs import GONE, not_running, slept_s
+from .standby import TICK_S, Lost, Standby
 
-TICK_S = 0.05
 _BUSY_S = 3.0
 """So long another process may still hold the port: the guard of an earlier trial that ends."""
 _AGAIN_S = 0.2
@@ -35,15 +36,13 @@ _SLEPT_S = 0.2
 _STANDS_S = 1.0
 """So long a robot that was not moving is asked to stand when its trial is gone."""
 _MOST_HEARD = 4096
-_TAKES_OVER_S = 1.0
-"""So long a trial that lives has to bring in who stands by, once its guard was killed."""
 
 
 class Guard:
     """Forwards bytes between the port and a pseudo-terminal that `link` points to, and stops the robot."""
 
-    def __init__(self, setup: dict[str, Any], control: socket.socket) -> None:
-        self._setup, self._control = setup, control
+    def __init__(self, setup: dict[str, Any], control: socket.socket, ends: socket.socket) -> None:
+        self._setup, self._control, self._ends = setup, control, ends
         self._order = StopOrder(setup["stop"])
         self._poll = select.poll()
         self._poll.register(control, select.POLLIN)
@@ -53,7 +52,7 @@ class Guard:
         self._armed = self._gone = self._done = self._terminated = self._spoke = self._other = False
         self.why = ""
         """What made it stop the robot; empty while it forwards."""
-        self._tripped_s = self._beat_s = self._tried_s = self._plugged_s = self._answered_s = 0.0
+        self._tripped_s = self._beat_s = self._tried_s = self._plugged_s = self._answered_s = self._lived_s = 0.0
         self._slept_s = slept_s()
 
     def run(self) -> None:
@@ -78,12 +77,13 @@ class Guard:
                     raise
                 time.sleep(TICK_S)
 
-    def takes_over(self, armed: bool, why: str) -> None:
-        """Stop the robot: nobody else will. What comes over the control socket counts no more."""
+    def takes_over(self, lost: Lost) -> None:
+        """Stop the robot: nobody else will."""
         signal.signal(signal.SIGTERM, self._terminate)
-        self._poll.unregister(self._control)
-        self._armed, self._gone = armed, True
-        self._trip(why)
+        self._armed, self._gone, self._beat_s = lost.armed, lost.gone, time.monotonic()
+        if lost.gone:
+            self._poll.unregister(self._control)
+        self._trip(lost.why)
         self.run()
 
     def ready(self) -> None:
@@ -136,7 +136,11 @@ class Guard:
                 log.write(line)
 
     def _turn(self, wait_s: float) -> None:
-        """Wait for something to come, and pass it on."""
+        """Wait for something to come, and pass it on; say that this process lives."""
+        if time.monotonic() - self._lived_s >= TICK_S:
+            self._lived_s = time.monotonic()
+            with contextlib.suppress(OSError):  # nobody stands by, or does not listen
+                self._ends.send(b".", socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL)
         for ready, events in self._poll.poll(1000 * wait_s):
             if ready == self._control.fileno():
                 self._told()
@@ -273,85 +277,30 @@ def main() -> None:
             return
         line += byte
     setup = json.loads(line)
+    lost = Lost(**setup["lost"]) if "lost" in setup else None
     if setup.get("standby"):
-        watched = socket.socket(fileno=int(sys.argv[4]))
-        found = _stood_by(control, watched)
-        if isinstance(found, Lost):
-            _taken_over(setup, control, found)
+        lost = Standby(setup["guard"], control, socket.socket(fileno=int(sys.argv[4]))).lost()
+        if lost is None:
             return
-        if found is None:
-            return
-        setup = found
     try:
-        _guarded(setup, control)
+        _guarded(setup, control, ends, lost)
     finally:
         with contextlib.suppress(OSError):
-            ends.send(b"d")  # who stands by need not take over
+            ends.send(b"d", socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL)  # who stands by need not take over
 
 
-class Lost(NamedTuple):
-    """Whether the robot might move, and why nobody stops it."""
-
-    armed: bool
-    why: str
-
-
-def _stood_by(control: socket.socket, watched: socket.socket) -> dict[str, Any] | Lost | None:
-    """The set-up with which the trial brings this process in; that trial and guard are lost; None if nothing is left to do."""
-    poll = select.poll()
-    for one in (control, watched):
-        poll.register(one, select.POLLIN)
-    armed, text = False, b""
-    ended, killed_s = False, None
-    while True:
-        ready = {number for number, _ in poll.poll(1000 * TICK_S if killed_s is not None else None)}
-        if watched.fileno() in ready:
-            poll.unregister(watched)
-            ended = bool(_heard(watched))
-            killed_s = None if ended else time.monotonic()
-        if control.fileno() in ready:
-            said = _heard(control)
-            if not said:
-                if ended or (killed_s is None and _heard(watched)):
-                    return None
-                return Lost(armed, f"the trial's process and its guard {GONE_BOTH}")
-            text += said
-            while text and not text.startswith(b"{"):
-                letter, text = text[:1], text[1:]
-                if letter == b"g":
-                    return None
-                armed = letter == b"a" if letter in b"as" else armed
-            if b"\n" in text:
-                return dict(json.loads(text.split(b"\n", 1)[0]))
-        if killed_s is not None and time.monotonic() - killed_s > _TAKES_OVER_S:
-            return Lost(armed, "the guard of the robot's port was killed, and the trial does nothing about it")
-
-
-def _heard(line: socket.socket) -> bytes:
+def _guarded(setup: dict[str, Any], control: socket.socket, ends: socket.socket, lost: Lost | None) -> None:
+    guard = Guard(setup, control, ends)
     try:
-        return line.recv(4096)
-    except OSError:
-        return b""
-
-
-def _taken_over(setup: dict[str, Any], control: socket.socket, lost: Lost) -> None:
-    guard = Guard(setup, control)
-    try:
-        guard.takes_over(*lost)
-    finally:
-        guard.close()
-
-
-def _guarded(setup: dict[str, Any], control: socket.socket) -> None:
-    guard = Guard(setup, control)
-    try:
-        guard.first_open()
-        guard.ready()
-    except OSError as error:
-        control.sendall((json.dumps({"kind": "refused", "errno": error.errno, "what": str(error)}) + "\n").encode())
-        guard.close()
-        return
-    try:
+        if lost is not None:
+            guard.takes_over(lost)
+            return
+        try:
+            guard.first_open()
+            guard.ready()
+        except OSError as error:
+            control.sendall((json.dumps({"kind": "refused", "errno": error.errno, "what": str(error)}) + "\n").encode())
+            return
         guard.run()
     finally:
         guard.close()

@@ -11,6 +11,7 @@ import socket
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -24,6 +25,7 @@ from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.guard import client as guard_client
 from bns.hardware.guard import process as guard_process
 from bns.hardware.guard import signs
+from bns.hardware.guard import standby as standby_process
 from bns.hardware.guard.client import Guard, GuardedClock, GuardedPlatform
 from bns.hardware.guard.holder import CODE
 from bns.hardware.guard.order import StopOrder
@@ -69,8 +71,12 @@ def held(tmp_path):
 
     yield build
     for robot, guard in opened:
-        guard.still()
-        guard.close()
+        if guard._control.fileno() >= 0:
+            guard.still()
+            guard.close()
+        else:  # the trial has vanished
+            guard._process.kill()
+            guard._process.wait(HANGS_S)
         robot.close()
 
 
@@ -100,6 +106,7 @@ def until(true):
 
 def trial_dies(guard):
     guard._control.close()
+    guard._watch.close()
     guard._next.end()
 
 
@@ -184,16 +191,19 @@ def test_a_computer_that_slept_stops_the_robot_first(tmp_path, nursery, link):
     assert "the computer slept for 600.0 s" in seen.said
 
 
-def test_a_trial_that_stood_still_together_with_its_guard_stops_the_robot(tmp_path, nursery):
+def test_who_stands_by_stops_the_robot_where_trial_and_guard_are_stopped_together(tmp_path, nursery):
+    """When the trial goes on, it ends as by any other stop."""
     seen = outlive.outlived(nursery, "bus", outlive.HELD, tmp_path)
-    assert seen.ended == 3
-    # the guard may go on first, and find the trial still stopped
-    assert re.search(r"did not check the robot for \d|no sign of life for \d|the trial's process was stopped", seen.said)
-
-
-def test_a_trial_whose_guard_is_killed_is_paused(tmp_path, nursery):
-    seen = outlive.outlived(nursery, "bridge", "the guard is killed", tmp_path)
     assert (seen.ended, seen.said) == (3, "the guard of the robot's port had ended")
+    assert [e["kind"] for e in seen.events if not e["kind"].startswith("port")][:2] == ["tripped", "stopped"]
+    assert seen.events[0]["why"] == "the robot's guard was stopped"
+
+
+@pytest.mark.parametrize(("link", "how"), [("bridge", "killed"), ("serial", "stopped")])
+def test_a_trial_whose_guard_is_lost_is_paused(tmp_path, nursery, link, how):
+    seen = outlive.outlived(nursery, link, f"the guard is {how}", tmp_path)
+    assert (seen.ended, seen.said) == (3, "the guard of the robot's port had ended")
+    assert seen.events[0]["why"] in {f"the robot's guard was {how}", "the robot's guard was killed"}  # by the trial, perhaps
 
 
 @pytest.mark.parametrize("link", LINKS)
@@ -251,7 +261,8 @@ def test_a_guard_that_is_killed_is_replaced_by_one_that_stops_the_robot(tmp_path
     assert guard.process != first
     assert (guard.process == standby.pid) is not both
     until(lambda: outlive._events(tmp_path))
-    assert outlive._events(tmp_path)[0]["why"] == "the trial was asked to stop"
+    why = "the guard of the robot's port had ended" if both else "the robot's guard was killed"
+    assert outlive._events(tmp_path)[0]["why"] == why
     robot.until(False)  # before its driver asks for that
     assert driver.stop(HANGS_S).confirmed
     assert not robot.moves()
@@ -291,7 +302,7 @@ def armed_guard(tmp_path):
     with near, far:
         setup = {"process": os.getpid(), "silent_s": HANGS_S, "log": None, "link": str(tmp_path / "x" / "y")}
         setup |= {"port": "none", "sysfs": "/sys", "identity": None, "gives_up_s": HANGS_S}
-        guard = guard_process.Guard(setup | {"stop": RECIPES["serial"].as_json()}, far)
+        guard = guard_process.Guard(setup | {"stop": RECIPES["serial"].as_json()}, far, near)
         near.send(b"a")
         guard._turn(1.0)
         yield guard
@@ -393,38 +404,144 @@ def test_what_stands_by_ends_when_the_trial_is_gone_and_the_guard_has_stopped_th
     set_off("serial", driver)
     robot.until(True)
     standby = guard._next
-    guard._control.close()
-    standby.control.close()
+    vanish(guard)
     robot.until(False)
     assert standby.process.wait(HANGS_S) == 0
     assert [event["kind"] for event in outlive._events(tmp_path)] == ["tripped", "stopped"]
     assert outlive._events(tmp_path)[0]["guard"] == guard.process
 
 
-@pytest.mark.parametrize("link", LINKS)
-@pytest.mark.parametrize(
-    ("hangs", "why"),
-    [
-        (False, "the trial's process and its guard are gone"),
-        (True, "the guard of the robot's port was killed, and the trial does nothing about it"),
-    ],
-)
-def test_what_stands_by_stops_the_robot_where_trial_and_guard_are_killed_at_once(tmp_path, held, link, hangs, why):
+def vanish(guard):
+    """The trial is gone, as far as guard and who stands by can tell."""
+    for one in (guard._control, guard._watch, guard._next.control, guard._next.watch):
+        one.close()
+
+
+def moving(held, link="serial"):
+    """A robot that moves, its guard, and who stands by."""
     robot, guard = held(link)
     driver = driver_of(link, guard, RealClock())
     guard.arm()
     set_off(link, driver)
     robot.until(True)
-    standby = guard._next
-    os.kill(guard.process, signal.SIGKILL)
+    return robot, guard, guard._next
+
+
+@pytest.mark.parametrize("link", LINKS)
+@pytest.mark.parametrize(
+    ("signal_", "hangs", "why"),
+    [
+        (signal.SIGKILL, False, "the trial's process and its guard are gone"),
+        (signal.SIGKILL, True, "the robot's guard was killed"),
+        (signal.SIGSTOP, False, "the robot's guard was stopped"),
+        (signal.SIGSTOP, True, "the robot's guard was stopped"),
+    ],
+)
+def test_what_stands_by_stops_the_robot_where_nothing_comes_of_the_guard_and_the_trial(tmp_path, held, link, signal_, hangs, why):
+    """The trial is killed as well, or does nothing."""
+    robot, guard, standby = moving(held, link)
+    os.kill(guard.process, signal_)
     if not hangs:
-        guard._control.close()
-        standby.control.close()
+        vanish(guard)
     robot.until(False)
+    until(lambda: outlive._events(tmp_path)[-1]["kind"] == "stopped")
+    first = outlive._events(tmp_path)[0]
+    assert (first["why"], first["guard"]) == (why, standby.process.pid)
+    if hangs:
+        assert standby.process.poll() is None  # it keeps the port, for a trial that may go on
+        vanish(guard)
     assert standby.process.wait(HANGS_S) == 0
-    events = outlive._events(tmp_path)
-    assert (events[0]["why"], events[0]["guard"]) == (why, standby.process.pid)
-    assert events[-1]["kind"] == "stopped"
+
+
+def test_a_trial_kills_a_guard_that_was_stopped(held):
+    """Who stands by looks for that, too; where it was killed before, a new process takes the port."""
+    robot, guard, standby = moving(held)
+    stopped = guard.process
+    os.kill(standby.process.pid, signal.SIGSTOP)
+    os.kill(stopped, signal.SIGSTOP)
+    until(lambda: guard.beat() or guard.tripped())
+    robot.until(False)
+    assert guard.process not in {stopped, standby.process.pid}
+
+
+def test_who_stands_by_is_replaced_when_it_was_killed(tmp_path, held):
+    robot, guard, standby = moving(held)
+    standby.process.kill()
+    standby.process.wait(HANGS_S)
+    until(lambda: guard.beat() or guard._next.process.pid != standby.process.pid)
+    assert guard.tripped() is None
+    assert robot.moves()
+    second = guard._next
+    os.kill(guard.process, signal.SIGKILL)
+    vanish(guard)
+    robot.until(False)
+    assert second.process.wait(HANGS_S) == 0
+    assert outlive._events(tmp_path)[0]["guard"] == second.process.pid
+
+
+def test_who_stands_by_and_did_not_run_takes_a_guard_that_lives_for_one_that_lives(tmp_path, held):
+    robot, guard, standby = moving(held)
+    standby.process.send_signal(signal.SIGSTOP)
+    end_s = time.monotonic() + 2 * standby_process._HANGS_S
+    while time.monotonic() < end_s:
+        guard.beat()
+        time.sleep(0.01)
+    standby.process.send_signal(signal.SIGCONT)
+    end_s = time.monotonic() + 0.5
+    while time.monotonic() < end_s:
+        guard.beat()
+        time.sleep(0.01)
+    assert guard.tripped() is None
+    assert robot.moves()
+    assert not outlive._events(tmp_path)
+
+
+@contextmanager
+def beside_a_guard():
+    """Sockets of who stands by for a process that sleeps; (trial's end, guard's end, what it is told, its answer)."""
+    (trial, control), (ends, watched) = socket.socketpair(), socket.socketpair()
+    with trial, control, ends, watched, subprocess.Popen(["sleep", "60"]) as sleeper, ThreadPoolExecutor(1) as pool:
+        answer = pool.submit(standby_process.Standby(sleeper.pid, control, watched).lost)
+        yield trial, ends, sleeper, answer
+        sleeper.kill()
+
+
+def test_a_guard_that_hangs_is_killed_by_who_stands_by():
+    with beside_a_guard() as (trial, _, sleeper, answer):
+        trial.send(b"a")
+        assert answer.result(HANGS_S) == ("the robot's guard hung", True, False)
+        assert sleeper.wait(HANGS_S) == -signal.SIGKILL
+
+
+@pytest.mark.parametrize(
+    ("said", "ended", "lost"),
+    [
+        (b"asg", b"", None),
+        (b"a", b"d", ("the guard of the robot's port had ended", True, False)),
+        (b"as", b"..d", ("the guard of the robot's port had ended", False, False)),
+    ],
+)
+def test_what_stands_by_knows_whether_the_robot_may_move(said, ended, lost):
+    with beside_a_guard() as (trial, ends, sleeper, answer):
+        trial.send(said)
+        time.sleep(0.2)
+        if ended:
+            ends.send(ended)
+        assert answer.result(HANGS_S) == lost
+        assert sleeper.poll() is None
+
+
+def test_a_guard_gives_signs_of_life(tmp_path):
+    with armed_guard(tmp_path) as guard:
+        guard._lived_s = 0.0
+        guard._ends = SimpleNamespace(send=lambda what, *_: sent.append(what))
+        sent = []
+        for _ in range(3):
+            guard._turn(0.0)
+        assert sent == [b"."]
+        time.sleep(1.1 * guard_process.TICK_S)
+        guard._turn(0.0)
+        assert sent == [b".", b"."]
 
 
 def test_a_robot_that_did_not_move_is_asked_to_stand_and_left_alone_where_both_are_killed(tmp_path, held):
@@ -433,8 +550,7 @@ def test_a_robot_that_did_not_move_is_asked_to_stand_and_left_alone_where_both_a
     guard.still()
     standby = guard._next
     os.kill(guard.process, signal.SIGKILL)
-    guard._control.close()
-    standby.control.close()
+    vanish(guard)
     assert standby.process.wait(HANGS_S) == 0
     assert outlive._events(tmp_path)[0]["kind"] == "tripped"
 
