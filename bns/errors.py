@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 
@@ -48,15 +49,19 @@ class TrialFileError(BnsError):
     @classmethod
     def of(cls, path: object, error: Exception) -> TrialFileError:
         """That ``path`` could not be written because of ``error``, and what to do."""
-        return cls(f"cannot write {path}: {getattr(error, 'strerror', None) or error}. {_STANDS}")
+        full = getattr(error, "errno", None) in _FULL
+        return cls(f"cannot write {path}: {getattr(error, 'strerror', None) or error}. {_STANDS} {_FREE if full else _GO_ON}")
 
     @classmethod
     def after(cls, error: Exception) -> TrialFileError:
         """What went wrong with a file once the robot had been driven; ``error`` names it."""
-        return cls(f"{error} {_STANDS}")
+        return cls(f"{error} {_STANDS} {_FREE}")
 
 
-_STANDS = "The robot stands still; earlier evaluations are in the journal. Free some space, then continue with --resume."
+_STANDS = "The robot stands still; earlier evaluations are in the journal."
+_FULL = {errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC)}
+_FREE = "Free some space, then continue with --resume."
+_GO_ON = "Correct that, then continue with --resume."
 
 
 class ClusterError(BnsError):

@@ -56,7 +56,8 @@ def rates(protocols: Sequence[int] = PROTOCOLS, every: bool = False) -> list[Rat
 
 class OnTheBus(NamedTuple):
     """A number at which something answers; `model` is 0 where the answer is garbled, or comes twice, as by two servos of the same
-    number, and `MUTE` where a ping is answered and nothing else: at status return level 0 (AX-12A, control table, address 16)."""
+    number, and `MUTE` where a ping is answered and nothing else: at status return level 0 (control tables: AX-12A, address 16; X
+    series, address 68)."""
 
     number: int
     baud: int
@@ -89,19 +90,28 @@ class ServoBus:
         self._packets = {protocol: PacketHandler(float(protocol)) for protocol in PROTOCOLS}
         self._line, self._baud = ClockedPort(port, clock), 0
         self._bits = 0
+        self.untried: list[int] = []
+        """Rates at which a scan could not look."""
         self.at(BAUD)
         self._line.find_echo()
 
     def at(self, baud: int) -> None:
         """Go on at this rate; HardwareError if the port cannot be opened or set to it."""
-        if baud != self._baud and not self._line.setBaudRate(baud):
+        if not self._set_to(baud):
             raise HardwareError(f"{self.port} cannot be set to {baud} baud; another adapter may be needed.")
-        self._baud = baud
+
+    def _set_to(self, baud: int) -> bool:
+        if baud != self._baud:
+            self._baud = baud if self._line.setBaudRate(baud) else 0
+        return self._baud == baud
 
     def scan(self, looked: Sequence[Rate] | None = None, numbers: Sequence[int] | None = None) -> Iterator[OnTheBus]:
-        """All that answers, number by number."""
+        """All that answers, number by number; rates that the adapter does not have are passed over, and listed in `untried`."""
+        self.untried = []
         for baud, protocol in rates() if looked is None else looked:
-            self.at(baud)
+            if not self._set_to(baud):
+                self.untried.append(baud)
+                continue
             packets = self._packets[protocol]
             for number in range(_LAST_ID + 1) if numbers is None else numbers:
                 model, result = self._pinged(packets, number)
@@ -185,9 +195,11 @@ class ServoBus:
 
     def unmuted(self, servo: OnTheBus) -> OnTheBus:
         """A servo that answered a ping alone, told to answer everything; HardwareError if it still does not."""
-        address, _ = AX12.span("status_return", "status_return")
+        table = next(one for one in TABLES.values() if one.protocol == servo.protocol)  # where models of one protocol agree
+        address, _ = table.span("status_return", "status_return")
+        packets = self._packets[servo.protocol]
         self.at(servo.baud)
-        self._asked(lambda: (0, *self._packets[1].writeTxRx(self._line, servo.number, address, 1, [_ANSWERS_ALL])), attempts=1)
+        self._asked(lambda: (0, *packets.writeTxRx(self._line, servo.number, address, 1, [_ANSWERS_ALL])), attempts=1)
         self._clock.sleep(_EEPROM_S)
         found = list(self.scan([Rate(servo.baud, servo.protocol)], [servo.number]))
         if len(found) != 1 or found[0].model in {0, MUTE}:
@@ -231,7 +243,10 @@ class ServoBus:
     def _pinged(self, packets: PacketHandler, number: int) -> tuple[int, int]:
         if packets is not self._packets[1]:
             model, result, _ = self._asked(lambda: packets.ping(self._line, number))
-            return int(model), result
+            if result != COMM_SUCCESS:
+                return int(model), result
+            _, read, _ = self._asked(lambda: packets.read2ByteTxRx(self._line, number, 0))
+            return MUTE if read == COMM_RX_TIMEOUT else int(model), result
         ping = [0, 0, number, 2, INST_PING, 0]  # the SDK's own ping reads the model as well, which some do not answer
         _, result, _ = self._asked(lambda: packets.txRxPacket(self._line, list(ping)))
         if result != COMM_SUCCESS:

@@ -25,6 +25,8 @@ def scan(bus: ServoBus, options: argparse.Namespace) -> int:
     for servo in bus.scan(_rates(options, options.all_bauds)):
         found.append(servo)
         print(servo, flush=True)
+    if bus.untried:
+        print(f"not tried: {', '.join(map(str, bus.untried))} baud; this adapter cannot be set to them", flush=True)
     more = "" if options.all_bauds else " (1 Mbaud and new ones; --all-bauds tries others)"
     print(f"{len(found)} ids answer{more}" if found else f"no servo answers{more}; is the supply on, is the cable connected?")
     if found and not any(servo.model for servo in found):

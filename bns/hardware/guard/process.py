@@ -87,7 +87,7 @@ class Guard:
         self.run()
 
     def ready(self) -> None:
-        """Say so, and what is at the port. From then on the robot may move, so that no SIGTERM ends this."""
+        """Say so, and what is at the port. From then on the robot may move, and a SIGTERM has it stopped."""
         signal.signal(signal.SIGTERM, self._terminate)
         self._control.sendall((json.dumps({"kind": "ready", "identity": self._line.identity}) + "\n").encode())
 
@@ -267,8 +267,8 @@ class Guard:
 
 def main() -> None:
     """Take the set-up from standard input, guard, end."""
-    for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU, signal.SIGPIPE):
-        signal.signal(number, signal.SIG_IGN)
+    for name in ("HUP", "INT", "QUIT", "TSTP", "TTIN", "TTOU", "PIPE", "TERM"):
+        signal.signal(getattr(signal, f"SIG{name}"), signal.SIG_IGN)
     control, ends = socket.socket(fileno=os.dup(0)), socket.socket(fileno=int(sys.argv[3]))
     line = b""
     while not line.endswith(b"\n"):

@@ -6,6 +6,9 @@ checksum (`bns.hardware.link.sealed_lines`).
 `t_s` is the trial's clock, `wall_s` the computer's (seconds since 1970). A line that a kill cut in two is dropped when the
 file is opened again; evaluations are synced to the disk before the next one begins.
 
+A log that was deleted meanwhile is written again from what the open file holds, and counts as a fault: else a trial would go on
+and keep nothing.
+
 A log that cannot be written does not raise where something is noted: a driver that is stopping its robot notes things too,
 and must not take a full disk for a lost link. The fault is kept, nothing more is written (what stands is whole but for its last
 line), and `check` and `sync` raise it.
@@ -13,6 +16,7 @@ line), and `check` and `sync` raise it.
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import time
@@ -42,7 +46,7 @@ class HardwareLog:
         if path is not None:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._seals = Seals(_drop_torn_line(path))
-            self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+            self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
 
     def note(self, kind: str, **what: Any) -> None:
         """Append one event; never raises because of the file."""
@@ -84,9 +88,21 @@ class HardwareLog:
                 rest = rest[os.write(self._descriptor, rest) :]
             if durably:
                 os.fsync(self._descriptor)
+                if os.fstat(self._descriptor).st_nlink == 0:
+                    self._put_back(self._descriptor)
         except OSError as error:
             self._fault = error
         self._held.clear()
+
+    def _put_back(self, lost: int) -> None:
+        """Write a log again that was deleted while it is open; raises an OSError that says so in any case."""
+        assert self._path is not None
+        data = os.pread(lost, os.fstat(lost).st_size, 0)
+        with self._path.open("xb") as again:
+            again.write(data)
+            again.flush()
+            os.fsync(again.fileno())
+        raise OSError(errno.ENOENT, "it was deleted while the trial ran, and was written again with all that it held")
 
     def __enter__(self) -> Self:
         return self

@@ -72,6 +72,17 @@ class ClockedPort(PortHandler):
         self.tx_time_per_byte = 1000.0 * _BITS_A_BYTE / cflag_baud
         return True
 
+    def setBaudRate(self, baudrate: int) -> bool:  # noqa: N802  # the SDK's name
+        """Open it at this rate; False if the adapter does not have it.
+
+        The SDK itself refuses rates that it does not list, such as the 400,000 and 250,000 baud of an AX-12.
+        """
+        self.baudrate = baudrate
+        try:
+            return self.setupPort(baudrate)
+        except ValueError:  # pyserial's, for a rate that cannot be set
+            return False
+
     def find_echo(self) -> None:
         """Whether the adapter echoes: no servo answers a question to all what is in its registers."""
         asked = WIRES[1].instruction(BROADCAST, READ, b"\0\1")

@@ -12,8 +12,9 @@ from bns.hardware.emulators.devices.bus import Bus
 from bns.hardware.emulators.devices.servo import Servo
 from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.emulators.faults import Faults
-from bns.hardware.servo_setup import ServoBus, adapter
+from bns.hardware.servo_setup import Rate, ServoBus, adapter
 from bns.hardware.servos.ax12_table import AX12, OVERLOAD
+from bns.hardware.servos.dynamixel_port import ClockedPort
 from bns.hardware.servos.snake_settings import snake_settings
 from bns.hardware.servos.x430_table import XL430_W250
 
@@ -180,9 +181,13 @@ def test_the_adapter_s_latency_timer(tmp_path):
     assert list(adapter("/dev/ttyACM0", tmp_path)) == []
 
 
-def test_a_servo_that_answers_a_ping_alone_is_named_and_mended(bus, capsys):
-    """Status return level 0 (AX-12A, control table, address 16): only a ping is answered."""
-    servos, port = bus(1, 2, 3, return_delay=0)
+@pytest.mark.parametrize("kind", [AX12, XL430_W250], ids=lambda kind: kind.model)
+def test_a_servo_that_answers_a_ping_alone_is_named_and_mended(bus, capsys, monkeypatch, kind):
+    """Status return level 0 (control tables: AX-12A, address 16; X series, address 68): only a ping is answered."""
+    at_one_rate = [Rate(1_000_000, kind.protocol)]  # the emulated ones answer at any
+    monkeypatch.setattr("bns.cli.commands.servos.rates", lambda *_: at_one_rate)
+    rest = {} if kind is AX12 else dict(kind.wanted)
+    servos, port = bus(1, 2, 3, kind=kind, baud_rate=kind.bauds[1_000_000], **rest | {"return_delay": 0})
     servos[1].put("status_return", 0)
     code, said = call(capsys, "scan", "--port", port)
     assert code == 2
@@ -196,6 +201,26 @@ def test_a_servo_that_answers_a_ping_alone_is_named_and_mended(bus, capsys):
     assert "servo 2: status_return written" in said.err
     assert (code, said.out.splitlines()[-1]) == (0, "all fine; 3 answer: ids 1 to 3")
     assert servos[1].get("status_return") == 2
+
+
+def test_rates_that_the_sdk_does_not_list_are_tried_and_those_of_no_adapter_named(bus, capsys, monkeypatch):
+    """400,000 and 250,000 baud are an AX-12's (baud rate 4 and 7); the SDK's own port refuses both."""
+    _, port = bus(3)
+    set_to = ClockedPort.setupPort
+    tried = []
+
+    def setup(self, baud):
+        tried.append(baud)
+        if baud == 400_000:
+            raise ValueError("Failed to set custom baud rate")  # as pyserial says it
+        return set_to(self, baud)
+
+    monkeypatch.setattr(ClockedPort, "setupPort", setup)
+    code, said = call(capsys, "scan", "--protocol", 1, "--all-bauds", "--port", port)
+    assert set(AX12.bauds) <= set(tried)
+    assert "not tried: 400000 baud; this adapter cannot be set to them" in said.out
+    assert "id 3 at 250000 baud: AX-12" in said.out  # the emulated one answers at any rate
+    assert code == 0
 
 
 def test_a_check_says_whom_it_looked_at(bus, capsys):

@@ -111,6 +111,32 @@ def test_a_log_that_is_full_says_so_and_stays_a_log(tmp_path, full, monkeypatch)
     assert [event["kind"] for event in events(path)] == ["one", "four"]
 
 
+def test_a_log_that_was_deleted_meanwhile_is_written_again_and_ends_the_trial(tmp_path):
+    path = tmp_path / "journal.jsonl"
+    log = HardwareLog(path, EmulatedClock(np.inf))
+    log.note("one", number=1)
+    log.sync()
+    path.unlink()
+    log.note("two", number=2)
+    said = r"journal\.jsonl: it was deleted while the trial ran, .* Correct that, then continue with --resume\.$"
+    with pytest.raises(TrialFileError, match=said):
+        log.sync()
+    with pytest.raises(TrialFileError):
+        log.close()
+    assert [event["kind"] for event in events(path)] == ["one", "two"]
+
+
+def test_a_log_whose_place_another_file_took_leaves_that_alone(tmp_path):
+    path = tmp_path / "journal.jsonl"
+    log = HardwareLog(path, EmulatedClock(np.inf))
+    log.note("one")
+    path.unlink()
+    path.write_text("somebody's")
+    with pytest.raises(TrialFileError, match="File exists"):
+        log.close()
+    assert path.read_text() == "somebody's"
+
+
 def test_a_log_that_is_full_is_no_lost_link(bench, full):
     on = bench()
     full(on.link._journal)
