@@ -106,7 +106,7 @@ class Guard:
         self._setup: dict[str, Any] = {"silent_s": silent_s, "gives_up_s": gives_up_s, "sysfs": sysfs, "identity": None}
         self.path = ""
         self._armed, self._told_s, self._tried_s, self._replaced_s = False, 0.0, 0.0, 0.0
-        self._stopped = False
+        self._stopped = self._next_stopped = False
         self._why: str | None = None
         self._next: _Process | None = None
         if not Path(port).exists():
@@ -248,9 +248,12 @@ class Guard:
                 self._why = self._why or f"the guard stopped the robot: {event['why']}"
 
     def _keep_next(self) -> None:
-        """Replace who stands by, if it was killed."""
+        """Replace who stands by, if it was killed or stopped."""
         if self._next is None or time.monotonic() - self._replaced_s < _AGAIN_S:
             return
+        before, self._next_stopped = self._next_stopped, not_running(self._next.process.pid) == STOPPED
+        if before and self._next_stopped:
+            self._next.process.kill()
         try:
             said = self._next.control.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT)
         except BlockingIOError:

@@ -49,7 +49,7 @@ class Guard:
         self._line = Line(setup["port"], setup["stop"]["baud"], setup["link"], self._poll, setup["sysfs"])
         self._line.identity = setup["identity"]
         self._heard = b""
-        self._armed = self._gone = self._done = self._terminated = self._spoke = self._other = False
+        self._armed = self._gone = self._done = self._terminated = self._spoke = self._other = self._away = False
         self.why = ""
         """What made it stop the robot; empty while it forwards."""
         self._tripped_s = self._beat_s = self._tried_s = self._plugged_s = self._answered_s = self._lived_s = 0.0
@@ -197,6 +197,7 @@ class Guard:
 
     def _lose(self) -> None:
         self._line.close()
+        self._away = True
         self._tell("port-lost")
         if self._armed:
             self._trip("the port is gone")
@@ -215,11 +216,14 @@ class Guard:
             if not self._other:
                 self._tell("other-device", what=str(error))
             self._other = True
+        except BlockingIOError:
+            pass  # the guard that was lost has not ended yet
         except OSError:
-            pass
+            self._away = True
         else:
-            self._other = False
-            self._tell("port-back")
+            if self._away:
+                self._tell("port-back")
+            self._other = self._away = False
 
     def _give_up(self) -> None:
         """Nobody is left to tell, and nothing answers: the robot was not moving, or it has not been heard for too long."""

@@ -453,21 +453,36 @@ def test_what_stands_by_stops_the_robot_where_nothing_comes_of_the_guard_and_the
     assert standby.process.wait(HANGS_S) == 0
 
 
-def test_a_trial_kills_a_guard_that_was_stopped(held):
-    """Who stands by looks for that, too; where it was killed before, a new process takes the port."""
+@pytest.mark.parametrize("signal_", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_trial_brings_in_a_new_process_where_guard_and_who_stands_by_are_lost(held, signal_):
     robot, guard, standby = moving(held)
-    stopped = guard.process
-    os.kill(standby.process.pid, signal.SIGSTOP)
-    os.kill(stopped, signal.SIGSTOP)
+    lost = {guard.process, standby.process.pid}
+    for process in lost:
+        os.kill(process, signal_)
     until(lambda: guard.beat() or guard.tripped())
     robot.until(False)
-    assert guard.process not in {stopped, standby.process.pid}
+    assert guard.process not in lost
+    assert guard._next.process.pid not in lost
 
 
-def test_who_stands_by_is_replaced_when_it_was_killed(tmp_path, held):
+def test_a_guard_that_is_lost_while_its_port_is_away_is_followed_by_one_that_waits_for_the_port(held):
     robot, guard, standby = moving(held)
-    standby.process.kill()
-    standby.process.wait(HANGS_S)
+    robot.line.cut()
+    os.kill(guard.process, signal.SIGKILL)
+    until(lambda: guard.beat() or guard.process == standby.process.pid)
+    end_s = time.monotonic() + 0.5
+    while time.monotonic() < end_s:
+        guard.beat()
+        time.sleep(0.01)
+    robot.plug_in()
+    robot.until(False)
+    assert guard.process == standby.process.pid
+
+
+@pytest.mark.parametrize("signal_", [signal.SIGKILL, signal.SIGSTOP])
+def test_who_stands_by_is_replaced_when_it_was_killed_or_stopped(tmp_path, held, signal_):
+    robot, guard, standby = moving(held)
+    standby.process.send_signal(signal_)
     until(lambda: guard.beat() or guard._next.process.pid != standby.process.pid)
     assert guard.tripped() is None
     assert robot.moves()
@@ -482,15 +497,9 @@ def test_who_stands_by_is_replaced_when_it_was_killed(tmp_path, held):
 def test_who_stands_by_and_did_not_run_takes_a_guard_that_lives_for_one_that_lives(tmp_path, held):
     robot, guard, standby = moving(held)
     standby.process.send_signal(signal.SIGSTOP)
-    end_s = time.monotonic() + 2 * standby_process._HANGS_S
-    while time.monotonic() < end_s:
-        guard.beat()
-        time.sleep(0.01)
+    time.sleep(2 * standby_process._HANGS_S)
     standby.process.send_signal(signal.SIGCONT)
-    end_s = time.monotonic() + 0.5
-    while time.monotonic() < end_s:
-        guard.beat()
-        time.sleep(0.01)
+    time.sleep(10 * standby_process.TICK_S)
     assert guard.tripped() is None
     assert robot.moves()
     assert not outlive._events(tmp_path)
