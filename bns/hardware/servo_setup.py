@@ -76,7 +76,7 @@ class OnTheBus(NamedTuple):
 
     def __str__(self) -> str:
         if self.mute:
-            return f"id {self.number} at {self.baud} baud: {_MUTE}; bns servos check --fix corrects it"
+            return f"id {self.number} at {self.baud} baud: {_MUTE}; bns servos check --fix --port PORT corrects it"
         if not self.model:
             return f"id {self.number} at {self.baud} baud: garbled; more than one servo has this id. Connect them one at a time"
         return f"id {self.number} at {self.baud} baud: {name_of(self.protocol, self.model)}"
@@ -154,7 +154,7 @@ class ServoBus:
         replace_it = f"replace it; suitable are {', '.join(TABLES)}"
         at_rate = f"bns servos set-id {number} --from {number} --port {self.port}"
         try_next = "" if usable else at_rate if table else replace_it
-        yield Finding(usable, f"servo {number} is a {name} at {servo.baud} baud", try_next)
+        yield Finding(usable, f"servo {number}: {name} at {servo.baud} baud", try_next)
         if table is None:
             return
         mend = f"bns servos check --fix --port {self.port}"
@@ -241,18 +241,17 @@ class ServoBus:
             raise HardwareError(f"servo {servo.number}: {name} is {found} after {value} was written; switch it off and on.")
 
     def _pinged(self, packets: PacketHandler, number: int) -> tuple[int, int]:
-        if packets is not self._packets[1]:
-            model, result, _ = self._asked(lambda: packets.ping(self._line, number))
-            if result != COMM_SUCCESS:
-                return int(model), result
-            _, read, _ = self._asked(lambda: packets.read2ByteTxRx(self._line, number, 0))
-            return MUTE if read == COMM_RX_TIMEOUT else int(model), result
-        ping = [0, 0, number, 2, INST_PING, 0]  # the SDK's own ping reads the model as well, which some do not answer
-        _, result, _ = self._asked(lambda: packets.txRxPacket(self._line, list(ping)))
+        """Who answers a ping: the model, or `MUTE`; and how the SDK calls the answer."""
+        ping = [0, 0, number, 2, INST_PING, 0]  # of protocol 1; the SDK's own reads the model as well, which some do not answer
+        first = packets is self._packets[1]
+        result = self._asked(lambda: packets.txRxPacket(self._line, list(ping)) if first else packets.ping(self._line, number))[1]
         if result != COMM_SUCCESS:
             return 0, result
-        model, result, _ = self._asked(lambda: packets.read2ByteTxRx(self._line, number, 0))
-        return (MUTE, COMM_SUCCESS) if result == COMM_RX_TIMEOUT else (int(model), result)
+        for _ in range(_SURE):  # a busy computer may miss an answer
+            model, result, _ = self._asked(lambda: packets.read2ByteTxRx(self._line, number, 0))
+            if result != COMM_RX_TIMEOUT:
+                return int(model), result
+        return MUTE, COMM_SUCCESS
 
     def _comes_twice(self, packets: PacketHandler, number: int, again: int) -> bool:
         """Whether two servos answer; `again`: it was asked before, and the second answer may have been a late one."""

@@ -97,7 +97,8 @@ class BridgeChain:
         pairs = enumerate(ANGLES.iter_unpack(bytes(limits_of)), 1)
         if wrong := [why for place, pair in pairs if (why := narrow(place, pair, AX12, reach_rad))]:
             self.close()
-            raise HardwareError("; ".join(wrong) + ". With the servos on a bus adapter, bns servos check --fix sets them.")
+            cure = "With the servos on a bus adapter, bns servos check --fix --port PORT sets them."
+            raise HardwareError(f"{'; '.join(wrong)}. {cure}")
 
     def _open(self) -> None:
         """Open the port, and say nothing until the board has said hello or cannot be starting any more (see `STARTED_S`)."""

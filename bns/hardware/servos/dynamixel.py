@@ -104,10 +104,11 @@ class DynamixelChain:
             return f"servo {number} is of the model {name_of(self.table.protocol, model)}, not {self.table.model}"
         for name in self.table.needed:
             if (value := self.read(number, name)) != self.table.wanted[name]:
-                return f"servo {number} has {name} {value}, not {self.table.wanted[name]} (bns servos check --fix sets it)"
+                wanted = self.table.wanted[name]
+                return f"servo {number} has {name} {value}, not {wanted} (bns servos check --fix --port PORT sets it)"
         # The limits now: behind a slow adapter they would hold up the first look at a robot that moves.
         why = narrow(number, self._angle_limits(number), self.table, self._reach_rad)
-        return f"{why} (bns servos check --fix sets them)" if why else ""
+        return f"{why} (bns servos check --fix --port PORT sets them)" if why else ""
 
     def _comes_twice(self, number: int) -> bool:
         self.read(number, "model_number")

@@ -534,7 +534,8 @@ def test_an_emulated_servo_restarts_as_the_manual_says(clock):
 
 
 def test_a_servo_in_wheel_mode_does_not_move(chain):
-    with pytest.raises(HardwareError, match=r"servo 2 is in wheel mode.*would turn without end .bns servos check --fix sets"):
+    said = r"servo 2 is in wheel mode.*would turn without end .bns servos check --fix --port PORT sets"
+    with pytest.raises(HardwareError, match=said):
         chain(prepare=lambda bus: bus.servos[1].put("ccw_angle_limit", 0))
 
 

@@ -80,4 +80,4 @@ def test_check_names_what_is_not_fit_and_mends_it(bus, capsys):
 def test_a_new_servo_is_said_to_need_the_rate_of_a_chain(bus, capsys):
     code, said = call(capsys, "check", "--port", bus(Servo(1, bus.clock, Faults(), None, XL430_W250)))
     assert code == 2
-    assert re.search(r"BAD  servo 1 is a XL430-W250 at 57600 baud\n +try: bns servos set-id 1 --from 1", said.out)
+    assert re.search(r"BAD  servo 1: XL430-W250 at 57600 baud\n +try: bns servos set-id 1 --from 1", said.out)
