@@ -6,8 +6,9 @@ Standard input is the control socket: first a line of JSON (the set-up), then si
 move from now on, `s` it was confirmed to stand, `t` stop it now, `g` goodbye. Answers are lines of JSON.
 
 A process whose set-up says so stands by. It hears `a`, `s` and `g`, too, and over a socket of their own signs of life of the
-process that guards (`.`), and its end (`d`). Where that one was killed or stopped, or hangs, it takes over by itself, at once and
-whatever the trial does, and stops the robot; a trial that lives finds it behind the same sockets and the same link.
+process that guards (`.`, and `o` before what may take long), and its end (`d`). Where that one was killed or stopped, or hangs,
+it takes over by itself, at once and whatever the trial does, and stops the robot; a trial that lives finds it behind the same
+sockets and the same link.
 """
 
 from __future__ import annotations
@@ -139,8 +140,7 @@ class Guard:
         """Wait for something to come, and pass it on; say that this process lives."""
         if time.monotonic() - self._lived_s >= TICK_S:
             self._lived_s = time.monotonic()
-            with contextlib.suppress(OSError):  # nobody stands by, or does not listen
-                self._ends.send(b".", socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL)
+            self._says(b".")
         for ready, events in self._poll.poll(1000 * wait_s):
             if ready == self._control.fileno():
                 self._told()
@@ -148,6 +148,11 @@ class Guard:
                 self._from_driver()
             elif ready == self._line.port:
                 self._from_robot(events)
+
+    def _says(self, letter: bytes) -> None:
+        """To who stands by: `.` it lives, `o` the next may take long (to open or close a port is the system's)."""
+        with contextlib.suppress(OSError):  # nobody stands by, or does not listen
+            self._ends.send(letter, socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL)
 
     def _told(self) -> None:
         try:
@@ -196,6 +201,7 @@ class Guard:
             self._lose()
 
     def _lose(self) -> None:
+        self._says(b"o")
         self._line.close()
         self._away = True
         self._tell("port-lost")
@@ -203,6 +209,7 @@ class Guard:
             self._trip("the port is gone")
 
     def _plug(self) -> None:
+        self._says(b"o")
         self._line.open()
         self._plugged_s, self._spoke = time.monotonic(), False
 

@@ -16,6 +16,8 @@ TICK_S = 0.05
 """A guard gives a sign of life so often, and who stands by looks for one."""
 _HANGS_S = 1.0
 """So long a guard may give none, while who stands by was running all the time: a busy computer delays both."""
+_OPENS_S = 30.0
+"""So long it may take to open or close a port: a Bluetooth link is made then, or what was written last waits to be sent."""
 _RAN_S = 4 * TICK_S
 """A process that looks less often did not run."""
 ENDED = "the guard of the robot's port had ended"
@@ -31,7 +33,7 @@ class Lost(NamedTuple):
 
 class Standby:
     """Watches the process `guard`. Over `control` its trial says whether the robot may move, over `watched` the guard that it
-    lives (`.`), or that it ends (`d`)."""
+    lives (`.`), opens or closes a port (`o`), or ends (`d`)."""
 
     def __init__(self, guard: int, control: socket.socket, watched: socket.socket) -> None:
         self._guard, self._control, self._watched = guard, control, watched
@@ -40,6 +42,7 @@ class Standby:
             self._poll.register(one, select.POLLIN)
         self._armed = self._gone = self._needless = self._stopped = False
         self._why = ""
+        self._patience_s = _HANGS_S
         self._looked_s = self._lived_s = time.monotonic()
 
     def lost(self) -> Lost | None:
@@ -69,7 +72,7 @@ class Standby:
 
     def _from_guard(self) -> None:
         said = _heard(self._watched)
-        self._lived_s = self._looked_s
+        self._lived_s, self._patience_s = self._looked_s, _OPENS_S if said.endswith(b"o") else _HANGS_S
         if b"d" in said:
             self._needless = self._needless or self._gone
             self._why = ENDED
@@ -80,7 +83,7 @@ class Standby:
         """Kill a guard that is stopped at two looks, or hangs: it has the port, and would go on when it continues."""
         before, self._stopped = self._stopped, not_running(self._guard) == STOPPED
         stopped = before and self._stopped
-        if stopped or now_s - self._lived_s > _HANGS_S:
+        if stopped or now_s - self._lived_s > self._patience_s:
             with contextlib.suppress(OSError):
                 os.kill(self._guard, signal.SIGKILL)
             self._why = f"the robot's guard {STOPPED if stopped else 'hung'}"
