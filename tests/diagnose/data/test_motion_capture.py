@@ -219,6 +219,12 @@ def test_an_export_that_lacks_something_says_what_and_what_to_do(tmp_path, text,
     assert "xport" in str(error.value)
 
 
+def test_an_export_with_a_field_that_no_reader_takes_is_refused(tmp_path):
+    (tmp_path / "bad.csv").write_text(HEAD.format(unit="Meters" + "s" * 200_000, kind="Rigid Body") + AXES)
+    with pytest.raises(DataError, match=r"bad.csv does not read as csv: field larger than field limit"):
+        read_table(tmp_path / "bad.csv")
+
+
 def test_the_command_line_proposes_and_imports(tmp_path, log, capsys):
     motive(log, tmp_path / "take.csv")
     commands(log, tmp_path / "told.csv")

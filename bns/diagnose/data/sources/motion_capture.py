@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import chain, islice, takewhile
 from pathlib import Path
+from typing import TextIO, cast
 
 import pandas as pd
 
@@ -44,8 +45,8 @@ class _Layout:
 
 def is_motion_capture(path: Path) -> bool:
     """Whether the file begins as Motive or Vicon begin theirs."""
-    with _opened(path) as lines:
-        first = next(iter(lines), "").strip()
+    with _opened(path) as file:
+        first = file.readline(len(_MOTIVE) + len(max(_VICON, key=len))).strip()  # a file of another kind may be one long line
     return first.startswith(_MOTIVE) or first.strip(_EMPTY) in _VICON
 
 
@@ -54,7 +55,8 @@ def read_motion_capture(path: Path) -> pd.DataFrame:
 
     DataError if the file has no body, no time, or names its columns otherwise.
     """
-    with _opened(path) as lines:
+    with _opened(path) as file:
+        lines = iter(file)
         head = list(islice(lines, _MOST_HEAD))
         layout = _motive(path, head) if head[0].startswith(_MOTIVE) else _vicon(path, chain(head, lines))
     table = pd.read_csv(
@@ -74,10 +76,10 @@ def read_motion_capture(path: Path) -> pd.DataFrame:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[Iterator[str]]:
+def _opened(path: Path) -> Iterator[TextIO]:
     opened = gzip.open if path.suffix == ".gz" else open
-    with opened(path, "rt", encoding="utf-8-sig", errors="replace", newline=None) as lines:
-        yield iter(lines)
+    with opened(path, "rt", encoding="utf-8-sig", errors="replace") as file:
+        yield cast(TextIO, file)
 
 
 def _cells(line: str, separator: str = ",") -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 import zlib
 from pathlib import Path
@@ -39,6 +40,7 @@ def read_table(path: Path) -> pd.DataFrame:
             return pd.read_parquet(path)
     except (
         ValueError,
+        csv.Error,
         OSError,
         EOFError,
         zlib.error,
