@@ -48,18 +48,21 @@ class Standby:
     def lost(self) -> Lost | None:
         """That the guard is lost, once it is; None if nobody needs one any more."""
         while not (self._needless or self._why):
-            ready = {number for number, _ in self._poll.poll(1000 * TICK_S)}
-            now_s = time.monotonic()
-            if now_s - self._looked_s > _RAN_S:
-                self._lived_s, self._stopped = now_s, False
-            self._looked_s = now_s
-            if self._control.fileno() in ready:
-                self._from_trial()
-            if self._watched.fileno() in ready:
-                self._from_guard()
-            elif self._armed or self._gone:
-                self._look(now_s)
+            self._turn()
         return None if self._needless else Lost(self._why, self._armed, self._gone)
+
+    def _turn(self) -> None:
+        ready = {number for number, _ in self._poll.poll(1000 * TICK_S)}
+        now_s = time.monotonic()
+        if now_s - self._looked_s > _RAN_S:
+            self._lived_s, self._stopped = now_s, False
+        self._looked_s = now_s
+        if self._control.fileno() in ready:
+            self._from_trial()
+        if self._watched.fileno() in ready:
+            self._from_guard()
+        elif self._armed or self._gone:
+            self._look(now_s)
 
     def _from_trial(self) -> None:
         said = _heard(self._control)
