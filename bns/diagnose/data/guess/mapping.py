@@ -122,7 +122,7 @@ def _of_clocks(joined: Clocks) -> str:
 
 
 def _other_bodies(entries: Entries, tables: Mapping[str, pd.DataFrame]) -> Iterator[str]:
-    """Bodies beside the one whose poses are taken, by columns that have its names but for the body's."""
+    """A remark where the file tracks other rigid bodies, too: columns named alike, but for the name of the body."""
     taken = str(entries.get("x_m", {}).get("from", ""))
     body, dot, rest = taken.partition(".")
     names = [str(c) for table in tables.values() if taken in table for c in table.columns]
