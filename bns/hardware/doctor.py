@@ -176,5 +176,5 @@ def _asked(examination: Callable[[], Iterator[Finding]], what: str) -> Iterator[
     try:
         yield from examination()
     except HardwareError as error:
-        text = str(error)
-        yield Finding(False, f"{what}: {text}", "what the line above says" if "Try" not in text else "")
+        text, _, step = str(error).partition(" Try: ")
+        yield Finding(False, f"{what}: {text}", "what the line above says" if step in {"", "bns doctor"} else step)

@@ -36,13 +36,14 @@ Stuck = tuple[str, tuple[tuple[str, int], ...], str]
 """A drive that could not go on, as in the journal: before the kind of event, its numbers, what was stuck."""
 
 
-def leaps_text(count: int) -> str:
-    """That so many poses cannot be, and what to look for; nothing if there are none."""
+def leaps_text(count: int, cycles: bool = False) -> str:
+    """That so many poses cannot be, and what to look for; nothing if there are none. ``cycles``: the robot moves in such."""
     if not count:
         return ""
     which = "1 pose is" if count == 1 else f"{count} poses are"
     cannot = "further from the one before than the robot can drive, or turned further than it can turn"
-    return f"{which} {cannot} (a false marker, a push?); bns track shows what is seen"
+    then = "; cycles with such poses count as unstable" if cycles else ""
+    return f"{which} {cannot} (a false marker, a push?){then}; bns track shows what is seen"
 
 
 @dataclass(frozen=True)
@@ -194,7 +195,7 @@ class TrialDriver:
         if driven.leaps:
             self.leaps += driven.leaps
             with self.suspended():
-                print(f"{purpose.text}: {leaps_text(driven.leaps)}", file=sys.stderr)
+                print(f"{purpose.text}: {leaps_text(driven.leaps, bool(driven.spans_s))}", file=sys.stderr)
         self._note(
             purpose,
             "driven",

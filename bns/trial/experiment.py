@@ -146,7 +146,7 @@ def _driven(trials: list[tuple[np.ndarray, np.ndarray]], how: TrialSetup, journa
     rows = len(measured(journal))
     faults = f"\n{opened.plan.outcome()}" if opened.plan.faults else ""
     many, kept = count_of(len(trials), "trial"), journal.with_name(MEASUREMENTS)
-    leaps = f"\n{leaps_text(driver.leaps)}" if driver.leaps else ""
+    leaps = f"\n{leaps_text(driver.leaps, driver.marked is not None)}" if driver.leaps else ""
     return f"{many} driven{ended}; {rows} rows of measurements in {kept}{leaps}{faults}"
 
 

@@ -99,8 +99,10 @@ class TerminalOperator:
         try:
             return self._ask(question).strip().lower()
         except EOFError as error:
+            self._check()  # a terminal that is closed ends the input, too
             raise TrialPausedError("paused by the operator, whose input has ended (with --yes, nobody is asked)") from error
         except KeyboardInterrupt as error:
+            self._check()  # other signals than Ctrl-C end a question as well, and say so
             raise TrialPausedError("paused by the operator") from error
 
     def _answer(self, question: str, words: dict[str, str]) -> str:

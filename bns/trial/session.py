@@ -194,7 +194,7 @@ def _driven(
             result = _looped(spec, how, driver, past, started, on_evaluation)
             _repeated(spec, how, driver, folder, result)
             opened.log.note("complete", evaluations=len(result.run.tables["evals"]["evaluation"]))
-            result = replace(result, faults=opened.plan.outcome(), leaps=leaps_text(driver.leaps))
+            result = replace(result, faults=opened.plan.outcome(), leaps=leaps_text(driver.leaps, driver.marked is not None))
     except HardwareError:
         if not past:  # nothing has moved: the next attempt is no resumption
             forget_unless(folder.journal, "trial")

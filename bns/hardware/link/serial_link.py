@@ -50,8 +50,8 @@ class SerialLink:
     def exchange(self, request: bytes, timeout_s: float, again: bool = False) -> bytes:
         """Send `request`, return the line that answers without its end; NoReplyError if none does within `timeout_s`.
 
-        Answers begin with the letter of their question. One to an older question is passed over, but a question asked `again` may
-        be answered by what is on its way since it was asked before.
+        Answers begin with the letter of their question, a small one. One to an older question is passed over, but a question asked
+        `again` may be answered by what is on its way since it was asked before. A question that comes back is the link's echo.
         """
         began_s = self._clock.now_s()
         for late in (self._owed, self._twice):
@@ -65,7 +65,7 @@ class SerialLink:
             in_vain = self._clock.in_vain(timeout_s)
             self._serial.write(request)
             line = self._line(in_vain)
-            while self._is_older(line, request, began_s):
+            while self._is_echo(line, request) or self._is_older(line, request, began_s):
                 self._journal.note("passed-over", data=line.decode("latin-1"))
                 line = self._line(in_vain)
         except (serial.SerialException, OSError, TerminalError, HardwareError) as error:
@@ -83,6 +83,11 @@ class SerialLink:
         self._twice += [pair for pair in self._owed if pair[1] == request]
         self._owed = [pair for pair in self._owed if pair[1] != request]
         return line.strip(b"\r\n")
+
+    def _is_echo(self, line: bytes, request: bytes) -> bool:
+        """Whether a line is what was asked, now or before: some adapters hand back what they send."""
+        asked = (request, *(what for _, what in (*self._owed, *self._twice)))
+        return line.endswith(b"\n") and any(line.strip(b"\r\n") == what.strip(b"\r\n") for what in asked)
 
     def _is_older(self, line: bytes, request: bytes, began_s: float) -> bool:
         """Whether a line answers a question from before: another letter, or the same one sooner than any answer has ever come."""

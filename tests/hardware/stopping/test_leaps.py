@@ -84,6 +84,7 @@ def test_leaps_of_a_khepera_are_counted_and_told(tmp_path, monkeypatch, capsys):
     said = capsys.readouterr()
     assert "evaluation 1: 2 poses are further from the one before than the robot can drive" in said.err
     assert "2 poses are further from the one before than the robot can drive" in said.out
+    assert "cycles" not in said.err + said.out
     assert len(past_evaluations(journal_of(tmp_path))) == 1
     assert len(measured(journal_of(tmp_path)))
 
@@ -106,6 +107,18 @@ def test_a_cycle_of_a_snake_with_a_leap_is_not_stable(rigged, monkeypatch):  # n
     assert driven.leaps == 1
     assert driven.poses[:, 8].tolist() == [1.0, 0.0, 1.0]
     assert {row["stable"] for row in driven.rows if row["cycle"] == 1 and not np.isnan(row["stable"])} == {0.0}
+
+
+def test_a_trial_of_a_snake_says_what_becomes_of_cycles_with_a_leap(tmp_path, monkeypatch, capsys):
+    table = tmp_path / "commands.csv"
+    rows = [",".join(map(str, [trial, *GENTLE[:4]])) for trial in (0, 0)]
+    table.write_text("\n".join(["trial,a_lat_rad,a_vert_rad,omega_rad,alpha_rad", *rows]))
+    leaping(FrameTracker, monkeypatch, 0.4, {4})
+    asked = ("trial", "--robot", "snake", "--emulated", "--yes", "--speed", "inf", "--commands", table, "--results", tmp_path)
+    assert call(*asked) == 0
+    said = capsys.readouterr()
+    assert "cycles with such poses count as unstable" in said.err
+    assert "cycles with such poses count as unstable" in said.out
 
 
 def test_a_snake_that_drives_as_it_can_has_no_leap(rigged):  # noqa: F811

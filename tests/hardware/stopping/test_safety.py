@@ -81,6 +81,22 @@ def test_ctrl_c_ends_a_question_at_once(monkeypatch):
     assert time.monotonic() - began < 4
 
 
+@pytest.mark.parametrize(("number", "word"), [(signal.SIGTERM, "terminated"), (signal.SIGHUP, "the terminal was closed")])
+def test_a_signal_that_ends_a_question_is_named_and_not_the_operator(monkeypatch, number, word):
+    monkeypatch.setattr("builtins.input", lambda _question: os.kill(os.getpid(), number) or time.sleep(5))
+    with Stopping() as stopping, pytest.raises(TrialPausedError, match=word):
+        TerminalOperator(stopping.ask, stopping.check).accept("evaluation 1", ())
+
+
+def test_a_terminal_that_is_closed_ends_the_input_too(monkeypatch):
+    def ended(_question):
+        stopping.request("the terminal was closed")
+        raise EOFError
+
+    with Stopping() as stopping, pytest.raises(TrialPausedError, match="the terminal was closed"):
+        TerminalOperator(ended, stopping.check).accept("evaluation 1", ())
+
+
 @pytest.mark.parametrize("fault", [None, RuntimeError("broken"), KeyboardInterrupt()])
 def test_a_stop_not_confirmed_is_louder_than_any_fault(fault):
     def inside():

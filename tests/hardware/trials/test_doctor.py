@@ -28,6 +28,8 @@ def test_what_is_missing_is_named_with_the_next_step(tmp_path, capsys):
     assert "BAD  the robot: there is no port /dev/nowhere" in said
     assert "BAD  the tracker: cannot open the Wii remote" in said
     assert "to be fixed" in said
+    assert "bns doctor" not in said  # it has just been asked
+    assert said.count("try:") > said.count("Try:") == 0
 
 
 def test_the_robot_is_the_one_that_the_rig_names(tmp_path, capsys):

@@ -175,6 +175,33 @@ def test_the_second_answer_to_a_question_asked_twice_is_none_to_the_next(tmp_pat
     assert [e["data"][:2] for e in events(tmp_path / "journal.jsonl", "passed-over")] == ["v,"]
 
 
+class EchoingLink:
+    """In front of a robot: an adapter that hands back what it sends, before the answer."""
+
+    def __init__(self, robot, end=b"\n"):
+        self._robot, self._end, self.written = robot, end, robot.written
+
+    def receive(self, data):
+        return data.replace(b"\n", self._end) + self._robot.receive(data)
+
+
+@pytest.mark.parametrize("end", [b"\n", b"\r\n"])
+@pytest.mark.parametrize("loss", [0.0, 0.025])
+def test_an_adapter_that_echoes_is_driven_like_any_other(tmp_path, clock, body, end, loss):
+    faults = Faults((Fault("lost-request", rate=loss), Fault("lost-reply", rate=loss)), 3, "khepera")
+    robot = KheperaEmulator(body, clock, firmware(2, 4), faults, 0.02)
+    with PseudoTerminal(EchoingLink(robot, end), tmp_path, "khepera") as line:
+        journal = HardwareLog(None, clock)
+        link = SerialLink(str(line.path), BAUD, clock, journal)
+        driver = KheperaIII(link, clock, journal)
+        for speed_m_s in (0.1, 0.08, 0.05):
+            driver.set_speed_m_s(speed_m_s, speed_m_s)
+            clock.sleep(1.0)
+            assert driver.speed_m_s() == pytest.approx((speed_m_s, speed_m_s), abs=0.01)
+        assert driver.stop().confirmed
+        link.close()
+
+
 @pytest.mark.parametrize(
     ("driver", "message"),
     [
