@@ -50,8 +50,8 @@ class SerialLink:
     def exchange(self, request: bytes, timeout_s: float, again: bool = False) -> bytes:
         """Send `request`, return the line that answers without its end; NoReplyError if none does within `timeout_s`.
 
-        Answers begin with the letter of their question, a small one. One to an older question is passed over, but a question asked
-        `again` may be answered by what is on its way since it was asked before. A question that comes back is the link's echo.
+        Answers begin with the letter of their question, in lower case. One to an older question is passed over, but a question
+        asked `again` may be answered by what is on its way since it was asked before. A question that comes back is an echo.
         """
         began_s = self._clock.now_s()
         for late in (self._owed, self._twice):

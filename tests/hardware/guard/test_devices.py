@@ -14,7 +14,7 @@ from bns.trial.session import _named
 
 from .. import outlive
 from ..robots_on_the_line import Robot
-from .test_guard import HANGS_S, RECIPES, trial_dies
+from .held import HANGS_S, RECIPES, trial_dies
 
 
 def say_what_is_there(sysfs, port, serial, socket_name="1-1"):
