@@ -101,6 +101,35 @@ def test_what_effects_earn_alone_stands_beside_them_while_the_diagnosis_works():
     assert "alone" not in screen._effects["motor-lag"]._text.object
 
 
+def test_effects_are_found_by_words_and_those_that_are_on_stay():
+    tab = Tab()
+    tab.open(LOG, "log.csv")
+    screen = entered(EffectsScreen, tab)
+
+    def shown():
+        return [name for name, each in screen._effects.items() if each.view in screen._switches.objects]
+
+    everything = shown()
+    assert len(everything) > 70
+    screen.switch("motor-lag", True)
+    screen._sought.value_input = "Swing caster"
+    assert "caster-swing" in shown()
+    assert "wheelbase" not in shown()
+    assert "motor-lag" in shown()
+    titles = [part.object for part in screen._switches.objects if "<h2" in str(getattr(part, "object", ""))]
+    assert not any("Clock" in title for title in titles)
+    screen._sought.value_input = "<xyzzy>"
+    assert shown() == ["motor-lag"]
+    assert f"0 of {len(everything)} effects mention &lt;xyzzy&gt;" in screen._how_many.object
+    screen.switch("motor-lag", False)
+    assert shown() == ["motor-lag"]  # nothing goes away under the pointer
+    screen._sought.value_input = "clock"
+    assert "clock-drift" in shown()
+    screen._sought.value_input = ""
+    assert shown() == everything
+    assert not screen._how_many.object
+
+
 def test_velocities_stand_in_words_with_units():
     for channel in (*CHANNELS, *WORLD):
         assert re.search(r" \(.+\)$", velocity(channel)), channel

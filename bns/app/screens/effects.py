@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import panel as pn
@@ -13,7 +14,7 @@ from bns.app.jobs import Jobs
 from bns.app.names import called
 from bns.app.parts import WIDE, Problem, beside, button, drawn, heading, html, offer, on_change, row
 from bns.app.screens.diagnosis import DiagnosisPart
-from bns.app.screens.one_effect import OneEffect
+from bns.app.screens.one_effect import GROUPS, OneEffect
 from bns.app.screens.snapshots import SnapshotsPart
 from bns.app.sliders import Slider
 from bns.app.switches import Switches, Term
@@ -23,16 +24,14 @@ from bns.diagnose.report.tables import ahead
 from bns.errors import ModelError
 from bns.physics.formula import ON, VARIABLES, formula_effect
 
-GROUPS = {
-    "wheel": "Wheels",
-    "body": "Body",
-    "mechanics": "Servos, joints and floor",
-    "world": "Floor",
-    "clock": "Clock",
-    "measure": "Camera",
-    "sight": "Camera and markers",
-}
-"""Stage of an effect -> what it is about, for people."""
+
+@dataclass(frozen=True)
+class Listed:
+    """All effects; their switches by what they are about, each part with its heading; what stands above them."""
+
+    effects: dict[str, OneEffect]
+    groups: list[tuple[Any, list[OneEffect]]]
+    above: list[Any]
 
 
 class EffectsScreen:
@@ -44,6 +43,10 @@ class EffectsScreen:
         self._problem, self._formula_problem = Problem(), Problem()
         self._effects: dict[str, OneEffect] = {}
         self._switches = pn.Column(**WIDE)
+        self._listed = Listed({}, [], [])
+        hint = "words, such as: slower in turns"
+        self._sought = pn.widgets.TextInput(**called("Find an effect"), placeholder=hint, width=300, visible=False)
+        self._how_many = html()
         self._errors, self._warnings = html(), html()
         self._ladder = LadderFigure()
         self._before = PathFigure("as given")
@@ -78,7 +81,7 @@ class EffectsScreen:
             return
         if bench is not self._bench:
             self._bench = bench
-            self._effects, self._switches.objects = {}, []
+            self._effects, self._switches.objects, self._sought.visible = {}, [], False
             self._formula.visible = bench.on_wheels
             names = list(bench.ready.predictor.tracks.names)
             offer(self._trial, dict(zip(names, range(len(names)), strict=True)))
@@ -107,7 +110,7 @@ class EffectsScreen:
             return
         self._listing = bench = self._bench
 
-        def listed(made: tuple[dict[str, OneEffect], list[Any]]) -> None:
+        def listed(made: Listed) -> None:
             if bench is self._bench and not self._effects:
                 self._lay_switches(made)
                 self._refresh_effects()
@@ -197,11 +200,25 @@ class EffectsScreen:
     def _list_effects(self) -> None:
         self._lay_switches(self._groups())
 
-    def _lay_switches(self, made: tuple[dict[str, OneEffect], list[Any]]) -> None:
-        self._effects, self._switches.objects = made
+    def _lay_switches(self, made: Listed) -> None:
+        self._listed, self._effects = made, made.effects
+        self._sought.visible = True
+        self._find()
 
-    def _groups(self) -> tuple[dict[str, OneEffect], list[Any]]:
-        """All effects, and their switches by what they are about; those that are there already stay the same."""
+    def _find(self) -> None:
+        """Only effects that hold the words sought, and those that are on."""
+        words, on = self._sought.value_input.lower().split(), self._tab.now.on
+        shown = [
+            (title, [e for e in inside if e.effect.name in on or e.holds(words)]) for title, inside in self._listed.groups
+        ]
+        parts = [part for title, inside in shown if inside for part in (title, *(each.view for each in inside))]
+        self._switches.objects = [*self._listed.above, *parts]
+        holding = sum(each.holds(words) for _, inside in self._listed.groups for each in inside)
+        whole = sum(len(inside) for _, inside in self._listed.groups)
+        self._how_many.object = note(f"{holding} of {whole} effects mention {' and '.join(words)}") if words else ""
+
+    def _groups(self) -> Listed:
+        """Those that are there already stay the same."""
         bench = self._tab.bench
         assert bench is not None
         mine = {t.name: t for t in self._tab.now.terms}
@@ -214,16 +231,12 @@ class EffectsScreen:
                 words = self._diagnosis.term_in_words(name)
                 said = f"{name}: add this term: {words}" if words else ""
                 effects[name] = OneEffect(effect, self.switch, self.move, said)
-        groups: list[Any] = []
-        if found:
-            groups += [heading("What no effect explains"), *(effects[name].view for name in found)]
+        groups = [(heading("What no effect explains"), [effects[name] for name in found])]
         for stage, title in GROUPS.items():
-            inside = [effects[n].view for n, e in named.items() if e.stage == stage]
-            if inside:
-                groups += [heading(title), *inside]
+            groups.append((heading(title), [effects[n] for n, e in named.items() if e.stage == stage]))
         present = ", ".join(a.effect.name for a in bench.ready.model.effects)
         there = [html(f"<p>In the model already: {present}.</p>")] if present else []
-        return effects, [*there, *groups]
+        return Listed(effects, groups, there)
 
     def _refresh_effects(self) -> None:
         if self._shown is not None:
@@ -294,6 +307,7 @@ class EffectsScreen:
         ):
             on_change(widget, act)
         on_change(self._term, self._check_term, "value_input")
+        on_change(self._sought, self._find, "value_input")
 
     def _laid_out(self) -> Any:
         variables = "; ".join(f"{name}: {text}" for name, text in VARIABLES.items())
@@ -304,7 +318,7 @@ class EffectsScreen:
             html(f"<details><summary>names that it may contain</summary>{variables}</details>"),
             **WIDE,
         )
-        left = pn.Column(self._switches, self._formula, **WIDE)
+        left = pn.Column(self._sought, self._how_many, self._switches, self._formula, **WIDE)
         right = pn.Column(
             row(self._undo, self._redo, self._fit),
             row(self._horizon, self._trial),

@@ -14,6 +14,16 @@ from bns.app.sliders import NumberSlider
 from bns.app.workbench import Shown
 from bns.physics.effect import Effect, Parameter
 
+GROUPS = {
+    "wheel": "Wheels",
+    "body": "Body",
+    "mechanics": "Servos, joints and floor",
+    "world": "Floor",
+    "clock": "Clock",
+    "measure": "Camera",
+    "sight": "Camera and markers",
+}
+"""Stage of an effect -> what it is about, for people."""
 _STEPS = 400
 _WRAPPED = "label { white-space: normal; overflow-wrap: anywhere; }"
 
@@ -42,6 +52,13 @@ class OneEffect:
         self._text = html(effect_text(effect, (), {}, ""), margin=(0, 8, 4, 30))
         self._sliders: dict[str, NumberSlider] = {}
         self.view = pn.Column(self._box, self._text, **WIDE)
+
+    def holds(self, words: Sequence[str]) -> bool:
+        """Whether each of the words, in lower case, is in what is said of the effect."""
+        effect = self.effect
+        numbers = " ".join(f"{p.name} {p.unit}" for p in effect.parameters)
+        said = f"{effect.name} {effect.in_words} {effect.equation} {effect.residuals} {numbers} {GROUPS.get(effect.stage, '')}"
+        return all(word in said.lower() for word in words)
 
     def set_on(self, on: bool) -> None:
         """The switch as the state has it, without telling anybody."""
