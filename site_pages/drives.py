@@ -65,6 +65,7 @@ VALUES: dict[str, dict[str, float]] = {
     "speed-limit-mismatch": {"max_m_s": 0.12, "left_spare": 0.1},
     "reverse-gain": {"gain": 0.8},
     "reversal-pause": {"pause_s": 0.5},
+    "start-delay": {"wait_s": 0.6},
     "side-slip": {"slip_s": 0.3},
     "slope-load": {"x_m_s": 0.02, "y_m_s": 0.01, "behind_share": 0.1, "at_rest": 0.0},
     "speed-gain": {"gain": 1.1},

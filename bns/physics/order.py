@@ -30,6 +30,7 @@ ORDER = (
     "speed-limit-mismatch",
     "speed-scaling",
     "reversal-pause",
+    "start-delay",
     OTHERS,
     "acceleration-limit",  # exact for commands, which are constant in a step: so before delay and lag
     "force-limit",

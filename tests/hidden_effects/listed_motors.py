@@ -50,6 +50,22 @@ class CommandTruncation(Cause):
 
 
 @dataclass
+class StartDelay(Cause):
+    """A wheel turns when it has been told to for a while: looked at in small steps."""
+
+    wait_s: float
+
+    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        out, small_s = np.zeros_like(wheels), moment.step_s / FINE
+        told_s = np.zeros_like(wheels[:, 0])
+        for i in range(wheels.shape[1]):
+            for _ in range(FINE):
+                told_s = np.where(wheels[:, i] == 0, 0.0, told_s + small_s)
+                out[:, i] += np.where(told_s > self.wait_s + small_s / 2, wheels[:, i], 0.0) / FINE
+        return out
+
+
+@dataclass
 class ReversalPause(Cause):
     """A wheel may turn one way when it has not been told to turn the other way for a while: looked at in small steps."""
 

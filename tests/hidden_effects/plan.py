@@ -84,14 +84,13 @@ UNLISTED: dict[str, tuple[Parameters, Parameters]] = {
     "swing": ({"rate_rad_s": 0.06, "period_s": 2.0}, {"rate_rad_s": 0.15, "period_s": 1.3}),
     "kicks": ({"rate_per_s": 0.08, "turn_rad": 0.06}, {"rate_per_s": 0.05, "turn_rad": 0.15}),
     "lost-pulses": ({"from_m_s": 0.1, "lost": 0.06}, {"from_m_s": 0.08, "lost": 0.15}),
-    "late-start": ({"time_s": 0.08}, {"time_s": 0.2}),
     "left-overshoot": ({"frequency_hz": 3.0, "damping": 0.6}, {"frequency_hz": 2.0, "damping": 0.35}),
     "speed-lag": ({"tau_s": 0.12, "fastest_m_s": 0.208}, {"tau_s": 0.3, "fastest_m_s": 0.208}),
     "stalls": ({"rate_per_s": 0.05, "time_s": 0.15}, {"rate_per_s": 0.05, "time_s": 0.4}),
     "loose-wheel": ({"loss": 0.03, "from_s": 800.0}, {"loss": 0.1, "from_s": 500.0}),
     "weak-supply": ({"loss": 0.06, "fastest_m_s": 0.208}, {"loss": 0.15, "fastest_m_s": 0.208}),
 }
-REVERSING = {"left-dead-zone", "reverse-loss", "late-start"}
+REVERSING = {"left-dead-zone", "reverse-loss"}
 """Effects that show only where wheels reverse or stand."""
 
 TIES: dict[str, dict[str, Parameters]] = {

@@ -68,6 +68,7 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
     "command-quantisation": ({"step_m_s": 0.02}, {"step_m_s": 0.04}),
     "command-truncation": ({"step_m_s": 0.02}, {"step_m_s": 0.04}),
     "reversal-pause": ({"pause_s": 0.1}, {"pause_s": 0.3}),
+    "start-delay": ({"wait_s": 0.08}, {"wait_s": 0.2}),
     "reverse-gain": ({"gain": 0.95}, {"gain": 1.12}),
     "turn-asymmetry": ({"share": 0.025}, {"share": -0.06}),
     "pivot-slip": ({"loss": 0.05}, {"loss": 0.15}),
@@ -165,6 +166,7 @@ TURNING = {
     "reverse-gain",
     "scrub-friction",
     "sliding-contact",
+    "start-delay",
     "stribeck",
     "supply-trip",
 }

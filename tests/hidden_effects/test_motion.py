@@ -25,12 +25,11 @@ from tests.hidden_effects.listed import (
 )  # fmt: skip
 from tests.hidden_effects.listed_floor import FloorPatch
 from tests.hidden_effects.listed_loads import ControllerOvershoot
-from tests.hidden_effects.listed_motors import Backlash
+from tests.hidden_effects.listed_motors import Backlash, StartDelay
 from tests.hidden_effects.luck import luck
 from tests.hidden_effects.motion import mean_commands, move
 from tests.hidden_effects.unlisted import Kicks, Swing
 from tests.hidden_effects.unlisted_motors import (
-    LateStart,
     LeftOvershoot,
     LooseWheel,
     LostPulses,
@@ -182,7 +181,7 @@ def test_mean_commands_keep_the_integral():
 
 
 def test_a_wheel_that_starts_late_loses_that_time_after_each_halt():
-    y = pose_after([LateStart(0.15)], (0.1, 0.1, 1.0), (0.05, 0.05, 1.0), (0.0, 0.0, 0.5), (0.1, 0.1, 1.0))[1]
+    y = pose_after([StartDelay(0.15)], (0.1, 0.1, 1.0), (0.05, 0.05, 1.0), (0.0, 0.0, 0.5), (0.1, 0.1, 1.0))[1]
     assert y == pytest.approx(0.1 * 0.85 + 0.05 + 0.1 * 0.85, abs=3e-4)
 
 

@@ -1,4 +1,4 @@
-"""What motors and their wheels do that no list holds: to start late, to swing, to slip or to come loose."""
+"""What motors and their wheels do that no list holds: to swing, to slip or to come loose."""
 
 from __future__ import annotations
 
@@ -20,20 +20,6 @@ class LostPulses(Cause):
     def command(self, wheels: np.ndarray) -> np.ndarray:
         size = np.abs(wheels)
         return np.sign(wheels) * np.where(size > self.from_m_s, self.from_m_s + (size - self.from_m_s) / (1 - self.lost), size)
-
-
-@dataclass
-class LateStart(Cause):
-    """A wheel that stands stays where it is for a while before it starts."""
-
-    time_s: float
-
-    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
-        out, waited = np.zeros_like(wheels), np.zeros_like(wheels[:, 0])
-        for i in range(wheels.shape[1]):
-            waited = np.where(wheels[:, i] == 0, 0.0, waited + moment.step_s)
-            out[:, i] = np.where(waited > self.time_s, wheels[:, i], 0.0)
-        return out
 
 
 @dataclass
@@ -109,7 +95,6 @@ class WeakSupply(Cause):
 
 MOTORS: dict[str, type[Cause]] = {
     "lost-pulses": LostPulses,
-    "late-start": LateStart,
     "left-overshoot": LeftOvershoot,
     "speed-lag": SpeedLag,
     "stalls": Stalls,

@@ -332,6 +332,20 @@ def test_a_wheel_stands_before_it_turns_the_other_way_counted_from_when_it_stopp
     assert again[-1, 0] == pytest.approx(0.2)
 
 
+def test_a_wheel_at_rest_starts_late_and_one_that_reverses_was_not_at_rest():
+    model = IDEAL.with_effect("start-delay", wait_s=0.5)
+    for speeds, driven in (
+        ((0.1, 0.2, -0.1), 0.1 * 0.5 + 0.2 - 0.1),  # stood before it began, and not in between
+        ((0.1, 0.0, 0.1), 0.2 * 0.5),
+        ((0.0, 0.1, 0.1), 0.1 * 1.5),
+    ):
+        assert simulate(model, [speeds], [speeds], [[1.0, 1.0, 1.0]])[0, -1, 0] == pytest.approx(driven)
+    short = simulate(model, [[0.1, 0.1, 0.1, 0.0, 0.1]], [[0.0] * 5], [[0.2, 0.2, 0.2, 0.1, 0.7]])[0]
+    assert short[:, 2] * -B == pytest.approx([0.0, 0.0, 0.01, 0.01, 0.03])
+    apart = simulate(model, [[0.1, 0.1]], [[0.1, 0.0]], [[1.0, 1.0]])[0]
+    assert apart[-1, 2] == pytest.approx(-0.1 / B)  # the left wheel has not stopped
+
+
 def test_a_wheel_starts_at_a_higher_command_than_it_stops_at():
     model = IDEAL.with_effect("breakaway", threshold_m_s=0.08, stop_ratio=0.5)
     for speeds, driven in (

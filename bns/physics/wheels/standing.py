@@ -28,6 +28,24 @@ def paused(target: Array, step_s: Array, pause_s: float) -> Array:
 
 
 @exact
+def started_late(target: Array, step_s: Array, wait_s: float) -> Array:
+    """Mean over each step of a speed that is 0 for the first ``wait_s`` after it was 0; at rest at first."""
+    mean = np.zeros_like(target)
+    for row in range(target.shape[0]):
+        since_s = 0.0
+        for k in range(target.shape[1]):
+            h, u = step_s[row, k], target[row, k]
+            if h == 0.0:
+                continue
+            if u == 0.0:
+                since_s = 0.0
+                continue
+            mean[row, k] = u * (1.0 - min(max(wait_s - since_s, 0.0), h) / h)
+            since_s += h
+    return mean
+
+
+@exact
 def broken_away(target: Array, step_s: Array, start: float, stop: float) -> Array:
     """The target from ``start`` on until it is below ``stop``, in size, or of the other direction, else 0; at rest at first."""
     out = np.zeros_like(target)

@@ -97,6 +97,7 @@ JOINTS = {name: number(0.01) for name in ("across_rad", "at_m", "over_m")}
             "the motors follow their commands with a lag of 60.2 ms on straight lines, and friction in the gears, which takes "
             "12.5 mm/s from a wheel that coasts, ends a motion sooner; at a steady command 12 mm/s are missing",
         ),
+        ("start-delay", {"wait_s": number(0.1502)}, "a wheel at rest starts 150 ms late"),
         (
             *("breakaway", {"threshold_m_s": number(0.075), "stop_ratio": number(0.47)}),
             "a wheel at rest starts at 75 mm/s, and one that turns stops at 47 % of that",

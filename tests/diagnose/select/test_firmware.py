@@ -26,6 +26,7 @@ def driven(trials=20, **effects):
         ("command-truncation", {"step_m_s": 0.013, "share": 1.0}),
         ("command-quantisation", {"step_m_s": 0.027, "share": 1.0}),
         ("reversal-pause", {"pause_s": 0.15}),
+        ("start-delay", {"wait_s": 0.15}),
         ("turn-dead-zone", {"width_rad_s": 0.2}),
         ("compass-deviation", {"cosine_share": 0.1, "sine_share": -0.06}),
         ("reverse-gain", {"gain": 0.9}),
