@@ -133,6 +133,11 @@ _SIGNALS = {
 """What ends a trial from outside, and how that is called."""
 
 
+def _by_nohup(number: signal.Signals) -> bool:
+    """Whether whoever began the trial has it outlive its terminal."""
+    return number.name == "SIGHUP" and signal.getsignal(number) is signal.SIG_IGN
+
+
 class Stopping:
     """Signals, noted while it is open and acted on at the next look; the robot is stopped before anything else ends.
 
@@ -151,7 +156,7 @@ class Stopping:
 
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
-            self._former = {n: signal.signal(n, self._handle) for n in _SIGNALS}
+            self._former = {n: signal.signal(n, self._handle) for n in _SIGNALS if not _by_nohup(n)}
         return self
 
     def __exit__(self, *_error: object) -> None:

@@ -12,7 +12,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
@@ -52,11 +52,19 @@ class _Process(NamedTuple):
 
     @classmethod
     def begun(cls, watched: socket.socket | None = None) -> Self:
-        """A new one; it ends when the socket is closed. ``watched``: over which it hears of the process that it stands by for."""
-        (control, far), (ends, watch) = socket.socketpair(), socket.socketpair()
-        inherited = [ends.fileno(), *([] if watched is None else [watched.fileno()])]
-        script = [sys.executable, "-I", "-S", "-c", CODE, str(_FOLDER.parent), str(os.getpid()), *map(str, inherited)]
-        with far, ends:
+        """A new one; it ends when the socket is closed. ``watched``: over which it hears of the process that it stands by for.
+
+        OSError where the system lets no further process begin.
+        """
+        with ExitStack() as far_ends, ExitStack() as near_ends:
+            control, far = socket.socketpair()
+            near_ends.enter_context(control)
+            far_ends.enter_context(far)
+            ends, watch = socket.socketpair()
+            near_ends.enter_context(watch)
+            far_ends.enter_context(ends)
+            inherited = [ends.fileno(), *([] if watched is None else [watched.fileno()])]
+            script = [sys.executable, "-I", "-S", "-c", CODE, str(_FOLDER.parent), str(os.getpid()), *map(str, inherited)]
             process = subprocess.Popen(
                 script,
                 stdin=far.fileno(),
@@ -65,12 +73,29 @@ class _Process(NamedTuple):
                 start_new_session=True,
                 pass_fds=inherited,
             )
+            near_ends.pop_all()  # they stay open
         return cls(process, control, watch)
 
     def say(self, what: bytes) -> None:
         """Tell it; one that was killed hears nothing."""
         with suppress(OSError):
             self.control.send(what)
+
+    def first_word(self, within_s: float) -> bytes:
+        """What it says first; nothing if it says nothing in time, was killed, or was stopped at two looks in a row."""
+        end_s, stopped = time.monotonic() + within_s, False
+        while (left_s := end_s - time.monotonic()) > 0:
+            before, stopped = stopped, not_running(self.process.pid) == STOPPED
+            if before and stopped:
+                break
+            self.control.settimeout(min(left_s, _SLICE_S))
+            try:
+                return self.control.recv(4096)
+            except TimeoutError:
+                continue
+            except OSError:
+                break
+        return b""
 
     def end(self) -> None:
         """Not needed; one that was stopped (SIGSTOP) is killed."""
@@ -114,9 +139,13 @@ class Guard:
         self._start()
         self._next = self._standing_by()
 
-    def _standing_by(self) -> _Process:
-        """A process that takes over by itself where the guard is lost."""
-        begun = _Process.begun(self._watch)
+    def _standing_by(self) -> _Process | None:
+        """A process that takes over by itself where the guard is lost; without one, the drive ends."""
+        try:
+            begun = _Process.begun(self._watch)
+        except OSError as error:
+            self._why = self._why or f"no process can be started that stands by for the robot's guard: {error}"
+            return None
         begun.say((json.dumps(self._told() | {"standby": True, "guard": self._process.pid}) + "\n").encode())
         if self._armed:
             begun.say(b"a")
@@ -139,7 +168,10 @@ class Guard:
 
     def _begin(self, folder: Path) -> dict[str, Any]:
         """What a new process answers to its set-up."""
-        self._process, self._control, self._watch = _Process.begun()
+        try:
+            self._process, self._control, self._watch = _Process.begun()
+        except OSError as error:
+            raise HardwareError(f"no process can be started that guards {self._port}: {error}. End other programs.") from error
         self._said = b""
         folder.mkdir(exist_ok=True)
         self._control.sendall((json.dumps(self._told()) + "\n").encode())
@@ -273,31 +305,38 @@ class Guard:
         self._tried_s = time.monotonic()
         self._control.close()
         self._watch.close()
-        self._process.kill()
-        self._process.wait(_READY_S)
+        _killed(self._process)
         standby, self._next = self._next, None
-        if standby is None or not self._adopted(standby, _HERE_S):
+        if (standby is not None and self._adopted(standby, _HERE_S)) or self._anew():
+            self._next = self._standing_by()
+
+    def _anew(self) -> bool:
+        """Whether a new process takes the port and stops the robot; else the driver finds no port, and says so."""
+        try:
             begun = _Process.begun()
-            begun.say((json.dumps(self._told() | {"lost": {"why": self._why, "armed": self._armed}}) + "\n").encode())
-            if not self._adopted(begun, _READY_S):
-                return  # the driver finds no port, and says so
-        self._next = self._standing_by()
+        except OSError:
+            return False
+        begun.say((json.dumps(self._told() | {"lost": {"why": self._why, "armed": self._armed}}) + "\n").encode())
+        return self._adopted(begun, _READY_S)
 
     def _adopted(self, begun: _Process, within_s: float) -> bool:
         """Whether a process says in time that it stops the robot; it is the guard then, and else it is killed."""
         self._process, self._control, self._watch = begun
-        self._said = b""
-        with suppress(OSError):  # TimeoutError, too
-            self._control.settimeout(within_s)
-            self._said = self._control.recv(4096)
+        self._said = begun.first_word(within_s)
         if self._said:
             self._control.setblocking(False)
             return True
-        begun.process.kill()
-        begun.process.wait(_READY_S)
+        _killed(begun.process)
         self._control.close()
         self._watch.close()
         return False
+
+
+def _killed(process: subprocess.Popen[bytes]) -> None:
+    """Kill a process, and wait until it is gone: not for ever, a port that hangs may hold it."""
+    process.kill()
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(_ENDS_S)
 
 
 class GuardedClock(RealClock):

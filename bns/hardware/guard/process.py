@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from .line import Line, OtherDeviceError
+from .notes import Notes
 from .order import StopOrder
 from .signs import GONE, not_running, slept_s
 from .standby import TICK_S, Lost, Standby
@@ -42,8 +43,8 @@ _MOST_HEARD = 4096
 class Guard:
     """Forwards bytes between the port and a pseudo-terminal that `link` points to, and stops the robot."""
 
-    def __init__(self, setup: dict[str, Any], control: socket.socket, ends: socket.socket) -> None:
-        self._setup, self._control, self._ends = setup, control, ends
+    def __init__(self, setup: dict[str, Any], control: socket.socket, ends: socket.socket, notes: Notes) -> None:
+        self._setup, self._control, self._ends, self._notes = setup, control, ends, notes
         self._order = StopOrder(setup["stop"])
         self._poll = select.poll()
         self._poll.register(control, select.POLLIN)
@@ -92,8 +93,13 @@ class Guard:
         signal.signal(signal.SIGTERM, self._terminate)
         self._control.sendall((json.dumps({"kind": "ready", "identity": self._line.identity}) + "\n").encode())
 
+    @property
+    def needless(self) -> bool:
+        """Whether nobody has to take over when this process ends."""
+        return self._done or not self._armed
+
     def close(self) -> None:
-        """Give everything free."""
+        """Give the port free."""
         self._line.close()
         with contextlib.suppress(OSError):
             Path(self._setup["link"]).parent.rmdir()
@@ -132,9 +138,7 @@ class Guard:
         line = (json.dumps({"kind": kind, "wall_s": round(time.time(), 3), **what}) + "\n").encode()
         with contextlib.suppress(OSError):
             self._control.send(line, socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL)
-        if self._setup["log"]:
-            with contextlib.suppress(OSError), Path(self._setup["log"]).open("ab") as log:
-                log.write(line)
+        self._notes.write(line)
 
     def _turn(self, wait_s: float) -> None:
         """Wait for something to come, and pass it on; say that this process lives."""
@@ -175,7 +179,7 @@ class Guard:
 
     def _from_driver(self) -> None:
         data = os.read(self._line.near, 4096)
-        if self.why and self._order.is_in(data):
+        if self.why and not self._gone and self._order.is_in(data):
             self._tell("taken-back", why=self.why)
             self.why = ""
         if not self.why:
@@ -281,6 +285,7 @@ def main() -> None:
     for name in ("HUP", "INT", "QUIT", "TSTP", "TTIN", "TTOU", "PIPE", "TERM"):
         signal.signal(getattr(signal, f"SIG{name}"), signal.SIG_IGN)
     control, ends = socket.socket(fileno=os.dup(0)), socket.socket(fileno=int(sys.argv[3]))
+    ends.set_inheritable(False)  # who stands by learns from its end that this process is gone
     line = b""
     while not line.endswith(b"\n"):
         byte = control.recv(1)
@@ -288,30 +293,32 @@ def main() -> None:
             return
         line += byte
     setup = json.loads(line)
-    lost = Lost(**setup["lost"]) if "lost" in setup else None
+    notes, lost = Notes(setup["log"]), Lost(**setup["lost"]) if "lost" in setup else None
     if setup.get("standby"):
-        lost = Standby(setup["guard"], control, socket.socket(fileno=int(sys.argv[4]))).lost()
+        watched = socket.socket(fileno=int(sys.argv[4]))
+        watched.set_inheritable(False)
+        lost = Standby(setup["guard"], control, watched).lost()
         if lost is None:
             return
+    guard = Guard(setup, control, ends, notes)
     try:
-        _guarded(setup, control, ends, lost)
-    finally:
-        with contextlib.suppress(OSError):
-            ends.send(b"d", socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL)  # who stands by need not take over
-
-
-def _guarded(setup: dict[str, Any], control: socket.socket, ends: socket.socket, lost: Lost | None) -> None:
-    guard = Guard(setup, control, ends)
-    try:
-        if lost is not None:
-            guard.takes_over(lost)
-            return
-        try:
-            guard.first_open()
-            guard.ready()
-        except OSError as error:
-            control.sendall((json.dumps({"kind": "refused", "errno": error.errno, "what": str(error)}) + "\n").encode())
-            return
-        guard.run()
+        _guarded(guard, control, lost)
     finally:
         guard.close()
+        with ends, contextlib.suppress(OSError):
+            if guard.needless:
+                ends.send(b"d", socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL)
+        notes.close()
+
+
+def _guarded(guard: Guard, control: socket.socket, lost: Lost | None) -> None:
+    if lost is not None:
+        guard.takes_over(lost)
+        return
+    try:
+        guard.first_open()
+        guard.ready()
+    except OSError as error:
+        control.sendall((json.dumps({"kind": "refused", "errno": error.errno, "what": str(error)}) + "\n").encode())
+        return
+    guard.run()

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 
 from bns.hardware.clock import RealClock
 from bns.hardware.guard import process as guard_process
+from bns.hardware.guard.notes import Notes
 from bns.hardware.guard.recipe import bridge_recipe, bus_recipe, khepera_recipe
 from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.link.serial_link import SerialLink
@@ -75,7 +76,7 @@ def armed_guard(tmp_path):
     with near, far:
         setup = {"process": os.getpid(), "silent_s": HANGS_S, "log": None, "link": str(tmp_path / "x" / "y")}
         setup |= {"port": "none", "sysfs": "/sys", "identity": None, "gives_up_s": HANGS_S}
-        guard = guard_process.Guard(setup | {"stop": RECIPES["serial"].as_json()}, far, near)
+        guard = guard_process.Guard(setup | {"stop": RECIPES["serial"].as_json()}, far, near, Notes(None))
         near.send(b"a")
         guard._turn(1.0)
         yield guard

@@ -12,6 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from bns.errors import HardwareError
 from bns.hardware.clock import RealClock
 from bns.hardware.guard import client as guard_client
 from bns.hardware.guard import process as guard_process
@@ -20,7 +21,7 @@ from bns.hardware.guard.client import Guard
 
 from .. import outlive
 from ..robots_on_the_line import LINKS
-from .held import HANGS_S, armed_guard, driver_of, moving, set_off, until, vanish
+from .held import HANGS_S, RECIPES, armed_guard, driver_of, moving, set_off, until, vanish
 
 
 def test_a_trial_that_ends_leaves_no_guard(held):
@@ -157,6 +158,42 @@ def test_a_trial_kills_a_guard_that_was_stopped(held):
     until(lambda: guard.beat() or guard.tripped())
     robot.until(False)
     assert guard.process != stopped
+
+
+def test_who_stands_by_and_was_stopped_is_not_waited_for(held):
+    _, guard = held("serial")
+    standby = guard._next
+    os.kill(standby.process.pid, signal.SIGSTOP)
+    began_s = time.monotonic()
+    assert standby.first_word(4 * HANGS_S) == b""
+    assert time.monotonic() - began_s < HANGS_S
+
+
+@pytest.mark.parametrize("signal_", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_trial_that_can_start_no_process_any_more_ends_its_drive(held, monkeypatch, signal_):
+    robot, guard, standby = moving(held)
+
+    def fails(*_watched):
+        raise OSError("too many open files")
+
+    monkeypatch.setattr(guard_client._Process, "begun", fails)
+    os.kill(standby.process.pid, signal_)
+    until(lambda: guard.beat() or guard.tripped())
+    assert guard.tripped() == "no process can be started that stands by for the robot's guard: too many open files"
+    guard.beat()
+    assert guard._next is None
+    guard.stop_now()
+    robot.until(False)
+
+
+def test_a_guard_that_cannot_be_started_is_told_of(tmp_path, monkeypatch):
+    def fails(*_watched):
+        raise OSError("too many open files")
+
+    monkeypatch.setattr(guard_client._Process, "begun", fails)
+    (tmp_path / "port").touch()
+    with pytest.raises(HardwareError, match=r"no process can be started that guards .*too many open files"):
+        Guard(str(tmp_path / "port"), RECIPES["serial"], HANGS_S)
 
 
 def test_a_trial_that_gets_no_new_guard_goes_on_to_say_that_its_port_is_gone(held, monkeypatch):

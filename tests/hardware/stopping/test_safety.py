@@ -69,6 +69,17 @@ def test_signals_are_noted_and_handlers_put_back(clock, number, word):
     assert signal.getsignal(number) == before
 
 
+def test_a_trial_begun_by_nohup_outlives_its_terminal():
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with Stopping() as stopping:
+            os.kill(os.getpid(), signal.SIGHUP)
+            stopping.check()
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
 def test_ctrl_c_ends_a_question_at_once(monkeypatch):
     def slow(_question):
         os.kill(os.getpid(), signal.SIGINT)
