@@ -169,6 +169,14 @@ class ServoBus:
         low, high = self.read(servo, "cw_angle_limit"), self.read(servo, "ccw_angle_limit")
         wide = not narrow(number, (low, high), table, GREATEST_RAD)
         yield Finding(wide, f"servo {number}: angle limits {low} to {high}", "" if wide else f"90° to both sides: {mend}")
+        if unguarded := self._unguarded(servo, table):
+            said = ", ".join(text for bit, text in table.alarms.items() if unguarded & (1 << bit))
+            yield Finding(False, f"servo {number}: does not switch itself off where new ones do: {said}", mend)
+        strongest = self.read(servo, "max_torque")
+        if strongest < table.full_torque:
+            address = table.registers["max_torque"].address
+            weak = f"write {table.full_torque} to its register {address}, unless it is meant to be as weak as that"
+            yield Finding(False, f"servo {number}: torque limited to {strongest} of {table.full_torque}", weak)
         volts, limits, (least_v, most_v) = self.read(servo, "present_voltage") / 10, limits_of(table), table.volts
         fed = limits.low_v <= volts <= limits.high_v
         supply = f"a supply of {limits.low_v:g} to {limits.high_v:g} V; the makers allow {least_v:g} to {most_v:g} V"
@@ -182,6 +190,10 @@ class ServoBus:
         hardware = self.read(servo, "hardware_error") if "hardware_error" in table.registers else 0
         return table.in_words(self._bits & table.alarm_bits, hardware)
 
+    def _unguarded(self, servo: OnTheBus, table: ServoTable) -> int:
+        """The alarms, bit by bit, at which a new servo of its model switches itself off and this one does not."""
+        return table.registers["alarm_shutdown"].default & ~self.read(servo, "alarm_shutdown")
+
     def mend(self, servo: OnTheBus) -> list[str]:
         """Write the settings that a drive needs, read them back; names of those that were changed."""
         changed = []
@@ -191,6 +203,9 @@ class ServoBus:
             if self.read(servo, name) != wanted[name]:
                 self.write(servo, name, wanted[name])
                 changed.append(name)
+        if servo.table is not None and (unguarded := self._unguarded(servo, servo.table)):
+            self.write(servo, "alarm_shutdown", self.read(servo, "alarm_shutdown") | unguarded)
+            changed.append("alarm_shutdown")
         return changed
 
     def unmuted(self, servo: OnTheBus) -> OnTheBus:

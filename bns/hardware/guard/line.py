@@ -34,6 +34,15 @@ def identity(port: str, sysfs: str) -> str | None:
     return None
 
 
+def where_it_is(wanted: str, sysfs: str) -> str | None:
+    """The name of the port at which a device is now; None where it is not."""
+    try:
+        names = sorted(entry.name for entry in (Path(sysfs) / "class" / "tty").iterdir())
+    except OSError:
+        return None
+    return next((name for name in names if identity(name, sysfs) == wanted), None)
+
+
 def _text(file: Path) -> str:
     try:
         return file.read_text(encoding="utf-8", errors="replace").strip()
@@ -64,19 +73,25 @@ class Line:
 
     def __init__(self, port: str, baud: int, link: str, poll: select.poll, sysfs: str = "/sys") -> None:
         self._name, self._baud, self._link, self._poll, self._sysfs = port, baud, Path(link), poll, sysfs
+        self._folder = Path(os.path.realpath(port)).parent
         self.port = self.near = self._far = -1
+        self.at = port
+        """The name under which the device was found last."""
         self.identity: str | None = None
         """Of the device at the port; another one is not opened."""
 
     def open(self) -> None:
         """Take the port, and make the line that the driver opens instead of it; OSError.
 
-        Only the device of the first time is opened: opening another one could start it.
+        Only the device of the first time is opened: opening another one could start it. It may have come back under another name.
         """
-        found = identity(self._name, self._sysfs)
+        name, found = self._name, identity(self._name, self._sysfs)
         if self.identity not in {None, found}:
-            raise OtherDeviceError(f"at {self._name} is {found or 'a device without a name'}, not {self.identity}")
-        self.port = opened(self._name, self._baud)
+            moved = where_it_is(str(self.identity), self._sysfs)
+            if moved is None and Path(self._name).exists():
+                raise OtherDeviceError(f"at {self._name} is {found or 'a device without a name'}, not {self.identity}")
+            name, found = (self._name, found) if moved is None else (str(self._folder / moved), self.identity)
+        self.port, self.at = opened(name, self._baud), name
         self.identity = found
         self.near, self._far = os.openpty()
         tty.setraw(self._far)

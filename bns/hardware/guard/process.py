@@ -233,7 +233,7 @@ class Guard:
             self._away = True
         else:
             if self._away:
-                self._tell("port-back")
+                self._tell("port-back", port=self._line.at)
             self._other = self._away = False
 
     def _give_up(self) -> None:

@@ -67,6 +67,36 @@ def test_a_device_that_takes_the_ports_name_hears_nothing_unless_it_is_the_robot
     robot.close()
 
 
+def test_a_robot_that_comes_back_under_another_name_is_stopped(tmp_path):
+    robot = Robot("serial", tmp_path)
+    sysfs = tmp_path / "sys"
+    say_what_is_there(sysfs, robot.path, "FT1234")
+    guard = Guard(str(robot.path), RECIPES["serial"], HANGS_S, tmp_path / "guard.jsonl", gives_up_s=HANGS_S, sysfs=str(sysfs))
+    guard.arm()
+    line = os.open(guard.path, os.O_RDWR | os.O_NOCTTY)
+    os.write(line, b"D,l20000,l20000\n")
+    robot.until(True)
+    os.close(line)
+    shutil.rmtree(sysfs)
+    robot.line.cut()
+    trial_dies(guard)
+    kept = [os.openpty() for _ in range(3)]  # the name that it had is somebody else's now
+    robot.plug_in()
+    now = os.path.realpath(robot.path)
+    robot.path.unlink()
+    say_what_is_there(sysfs, now, "FT1234")
+    say_what_is_there(sysfs, os.ttyname(kept[0][1]), "FT9999")
+    assert guard._process.wait(HANGS_S) == 0
+    events = outlive._events(tmp_path)
+    assert events[-1]["kind"] == "stopped"
+    assert [e["port"] for e in events if e["kind"] == "port-back"] == [now]
+    assert not robot.moves()
+    for ends in kept:
+        for end in ends:
+            os.close(end)
+    robot.close()
+
+
 def test_a_guard_whose_port_never_comes_back_ends_after_the_time_that_the_rig_says(tmp_path):
     robot = Robot("serial", tmp_path)
     guard = Guard(str(robot.path), RECIPES["serial"], HANGS_S, tmp_path / "guard.jsonl", gives_up_s=1.5)

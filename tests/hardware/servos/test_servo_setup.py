@@ -139,6 +139,31 @@ def test_check_names_what_is_not_fit_and_mends_it(bus, capsys):
     assert "servo 1: status_return, return_delay, cw_angle_limit written" in said.err
 
 
+@pytest.mark.parametrize("kind", [AX12, XL430_W250], ids=lambda kind: kind.model)
+def test_a_servo_that_does_not_protect_itself_or_is_weak_is_named(bus, capsys, monkeypatch, kind):
+    """Shutdown and max torque (X series: PWM limit) of the control tables; new ones switch off at overload and heat."""
+    monkeypatch.setattr("bns.cli.commands.servos.rates", lambda *_: [Rate(1_000_000, kind.protocol)])
+    servos, port = bus(1, 2, 3, kind=kind, baud_rate=kind.bauds[1_000_000], **dict(kind.wanted) | {"return_delay": 0})
+    assert call(capsys, "check", "--port", port)[0] == 0
+    servos[0].put("alarm_shutdown", 0b1 << 2)
+    servos[1].put("max_torque", 50)
+    servos[2].put("alarm_shutdown", kind.registers["alarm_shutdown"].default | 1)
+    code, said = call(capsys, "check", "--port", port)
+    assert code == 2
+    electric = "electrical shock, or too little power for its motor, " if kind is XL430_W250 else ""
+    assert f"BAD  servo 1: does not switch itself off where new ones do: {electric}overload\n     try: bns servos" in said.out
+    register = 14 if kind is AX12 else 36
+    assert f"BAD  servo 2: torque limited to 50 of {kind.full_torque}\n     try: write {kind.full_torque} to its" in said.out
+    assert f"register {register}, unless" in said.out
+    assert said.out.splitlines()[-1] == "2 to be fixed; 3 answer: ids 1 to 3"
+    said = call(capsys, "check", "--fix", "--port", port)[1]
+    assert "servo 1: alarm_shutdown written" in said.err
+    assert said.out.splitlines()[-1] == "1 to be fixed; 3 answer: ids 1 to 3"  # how strong it is meant to be, nobody else knows
+    assert servos[0].get("alarm_shutdown") == kind.registers["alarm_shutdown"].default
+    assert servos[2].get("alarm_shutdown") == kind.registers["alarm_shutdown"].default | 1
+    assert servos[1].get("max_torque") == 50
+
+
 def test_thirteen_volts_are_refused(bus, capsys):
     servos, port = bus(1, return_delay=0)
     assert call(capsys, "check", "--port", port)[0] == 0
