@@ -154,8 +154,9 @@ def _named(path: str, port: str) -> Iterator[None]:
 def _let_go(guard: Guard) -> None:
     """Say goodbye; say so where it has to go on."""
     if not guard.close():
-        end = f"once its power is cut, end the guard with kill -9 {guard.process} (docs/trials.md, After exit 4)"
-        print(f"the guard of the port (process {guard.process}) keeps trying to stop the robot; {end}", file=sys.stderr)
+        left = " ".join(map(str, guard.left))
+        end = f"once its power is cut, end the guard with kill -9 {left} (docs/trials.md, After exit 4)"
+        print(f"the guard of the port (process {guard.left[0]}) keeps trying to stop the robot; {end}", file=sys.stderr)
 
 
 def carry_out(spec: RunSpec, how: TrialSetup, results: Path, on_evaluation: Progress = lambda _row: None) -> KeptTrial:

@@ -97,11 +97,19 @@ class _Process(NamedTuple):
                 break
         return b""
 
-    def end(self) -> None:
-        """Not needed; one that was stopped (SIGSTOP) is killed."""
-        self.say(b"g")
+    def let_go(self) -> None:
+        """Its trial ends: it stays as long as there is a guard to stand by for."""
         self.control.close()
         self.watch.close()
+
+    def end(self) -> None:
+        """Not needed."""
+        self.say(b"g")
+        self.let_go()
+        self.gone()
+
+    def gone(self) -> None:
+        """Wait until it has ended; one that was stopped (SIGSTOP) is killed."""
         try:
             self.process.wait(_ENDS_S)
         except subprocess.TimeoutExpired:
@@ -133,6 +141,8 @@ class Guard:
         self._armed, self._told_s, self._tried_s, self._replaced_s = False, 0.0, 0.0, 0.0
         self._stopped = self._next_stopped = False
         self._why: str | None = None
+        self.left: list[int] = []
+        """Processes that go on trying to stop the robot when the trial ends, the guard's first."""
         self._next: _Process | None = None
         if not Path(port).exists():
             raise HardwareError(no_port(port))
@@ -240,20 +250,25 @@ class Guard:
         return self._why
 
     def close(self) -> bool:
-        """Say goodbye; whether the guard has ended. One that goes on is still trying to stop the robot."""
+        """Say goodbye; whether the guard has ended. One that goes on is still trying to stop the robot; who stands by stays, too."""
         self._listen()
-        if self._next is not None:
-            self._next.end()
-            self._next = None
+        standby, self._next = self._next, None
+        if standby is not None:  # first: a guard that ends then needs nobody in its place
+            standby.let_go()
         with suppress(OSError):
             self._control.send(b"g")
         self._control.close()
         self._watch.close()
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(_ENDS_S)
-        ended = self._process.returncode is not None
-        self._process.returncode = 0 if not ended else self._process.returncode  # it outlives this process on purpose
-        return ended
+        if self._process.returncode is not None:
+            if standby is not None:
+                standby.gone()
+            return True
+        for process in (self._process, *([] if standby is None else [standby.process])):
+            self.left.append(process.pid)
+            process.returncode = 0  # it outlives this process on purpose
+        return False
 
     def _tell(self, what: bytes) -> None:
         try:

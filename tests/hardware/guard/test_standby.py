@@ -32,6 +32,38 @@ def test_a_trial_that_ends_leaves_no_guard(held):
     assert standby.returncode == 0
 
 
+def test_a_guard_that_goes_on_after_its_trial_keeps_who_stands_by(tmp_path, held):
+    """The port is away at the end of the trial; then the guard is killed, and the port comes back."""
+    robot, guard, standby = moving(held)
+    process = guard._process
+    robot.line.cut()
+    until(guard.tripped)
+    assert not guard.close()
+    assert guard.left == [process.pid, standby.process.pid]
+    for each in (process, standby.process):
+        each.returncode = None  # they are this test's to wait for
+    os.kill(process.pid, signal.SIGKILL)
+    assert process.wait(HANGS_S) == -signal.SIGKILL
+    robot.plug_in()
+    robot.until(False)
+    assert standby.process.wait(HANGS_S) == 0
+    assert outlive._events(tmp_path)[-1]["kind"] == "stopped"
+
+
+def test_what_stands_by_is_not_needed_once_a_guard_that_went_on_has_stopped_the_robot(held):
+    robot, guard, standby = moving(held)
+    process = guard._process
+    robot.line.cut()
+    until(guard.tripped)
+    assert not guard.close()
+    for each in (process, standby.process):
+        each.returncode = None
+    robot.plug_in()
+    robot.until(False)
+    assert process.wait(HANGS_S) == 0
+    assert standby.process.wait(HANGS_S) == 0
+
+
 def test_what_stands_by_ends_even_if_it_was_stopped(held):
     _, guard = held("serial")
     standby = guard._next.process
