@@ -250,7 +250,7 @@ class Guard:
         return self._why
 
     def close(self) -> bool:
-        """Say goodbye; whether the guard has ended. One that goes on is still trying to stop the robot; who stands by stays, too."""
+        """Say goodbye; whether the guard has ended. One that goes on still tries to stop the robot; who stands by stays."""
         self._listen()
         standby, self._next = self._next, None
         if standby is not None:  # first: a guard that ends then needs nobody in its place
