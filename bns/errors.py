@@ -25,6 +25,10 @@ class ModelError(BnsError):
     """A robot model, network file or table of measurements that cannot be used."""
 
 
+class EffectError(ModelError):
+    """An effect of the user's own whose Python fails, or returns what is no signal: a mistake, whatever its numbers are."""
+
+
 class HardwareError(BnsError):
     """A port, robot, camera, calibration or plan of a trial that cannot be used; nothing has moved."""
 

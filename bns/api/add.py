@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from bns.api.common.arguments import checked_progress, several
-from bns.api.common.own_effects import own_effects_named
 from bns.api.common.parameters import parameter_table
 from bns.api.common.prepared import Prepared, prepared, with_effects
 from bns.api.common.progress import Progress, silent
@@ -140,7 +139,6 @@ def add(
     return added(ready, chosen, per_trial, progress=progress)
 
 
-@own_effects_named()
 @in_force(DEFAULTS)
 def added(
     ready: Prepared,

@@ -11,7 +11,6 @@ import pandas as pd
 
 from bns.api.common.arguments import checked_progress
 from bns.api.common.cache import remembered
-from bns.api.common.own_effects import own_effects_named
 from bns.api.common.prepared import Prepared, PreparedNetworks, are_networks, prepared, prepared_networks, these_very
 from bns.api.common.progress import Meter, Progress
 from bns.api.common.provenance import provenance
@@ -127,7 +126,6 @@ class CompareResult(Shown):
         return f"{c.model} on {self.log.name}: {error}, {ahead(c.near)} ahead, {counted(c.trials, 'trial')}"
 
 
-@own_effects_named()
 @in_force(DEFAULTS)
 def compare(
     log: Log,

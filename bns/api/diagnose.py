@@ -14,7 +14,6 @@ import pandas as pd
 from bns.api.common.arguments import checked_progress, several
 from bns.api.common.cache import remembered
 from bns.api.common.next_command import model_words, noted, own_files, repeated
-from bns.api.common.own_effects import own_effects_named
 from bns.api.common.parameters import parameter_table
 from bns.api.common.prepared import Prepared, prepared, with_effects
 from bns.api.common.progress import Meter, Progress
@@ -214,7 +213,6 @@ class DiagnoseResult(Shown):
         return f"{self.verdict}{lacks}; {self.ready.model.name} on {self.ready.log.name}, {trials}"
 
 
-@own_effects_named()
 def diagnose(
     log: Log,
     model: Given,

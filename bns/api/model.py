@@ -13,6 +13,7 @@ from typing import Any
 from bns.api.common.arguments import as_path, named_model
 from bns.errors import ModelError, in_both, unknown_name
 from bns.physics import model as physics
+from bns.physics.figures import with_unit
 from bns.physics.jointed.mechanism import machine
 from bns.physics.jointed.model import JointedModel
 from bns.physics.jointed.model_files import is_body, load_body
@@ -89,7 +90,7 @@ class Model(physics.Model):
         lines = [f"model {self.name}: {self.base}, wheelbase {self.wheelbase_m:g} m"]
         for active in self.effects:
             units = {p.name: p.unit for p in active.effect.parameters}
-            numbers = ", ".join(f"{name} = {value:.5g} {units[name]}" for name, value in active.by_name.items())
+            numbers = ", ".join(f"{name} = {value:.5g}{with_unit(units[name])}" for name, value in active.by_name.items())
             lines.append(f"  {active.effect.name}: {numbers}" + (f" ({active.basis})" if active.basis else ""))
         if self.jitter_relative:
             lines.append(f"  motors vary by {self.jitter_relative:g} of their speed from command to command")

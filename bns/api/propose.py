@@ -15,7 +15,6 @@ import pandas as pd
 
 from bns.api.common.arguments import as_path, checked_progress
 from bns.api.common.next_command import limits_in_words, noted
-from bns.api.common.own_effects import own_effects_named
 from bns.api.common.progress import Meter, Progress, part
 from bns.api.common.provenance import provenance
 from bns.api.common.shown import Shown, counted
@@ -113,7 +112,6 @@ class ProposeResult(Shown):
         return f"{trials}, {minutes:.1f} min, decide with a chance of {self.power:.0%} between {models}"
 
 
-@own_effects_named()
 def propose(
     log: Log,
     model: Given,
@@ -150,7 +148,6 @@ def propose(
     return proposed(found, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=rest)
 
 
-@own_effects_named()
 def proposed(
     found: DiagnoseResult,
     *,

@@ -10,7 +10,6 @@ from pathlib import Path
 
 from bns.api.common.arguments import as_path, checked_progress
 from bns.api.common.next_command import limits_in_words
-from bns.api.common.own_effects import own_effects_named
 from bns.api.common.progress import Meter, Progress, part
 from bns.api.common.shown import Shown
 from bns.api.diagnose import DiagnoseResult, diagnose
@@ -56,7 +55,6 @@ class ReportResult(Shown):
         return f'<a href="{html.escape(str(self.path))}">{html.escape(self._line())}</a>'
 
 
-@own_effects_named()
 def report(
     log: Log,
     model: Given,
@@ -86,7 +84,6 @@ def report(
     return reported(found, path, minutes=minutes, arena=arena, start=start, speeds=speeds, progress=rest)
 
 
-@own_effects_named()
 def reported(
     found: DiagnoseResult,
     path: str | PathLike[str],

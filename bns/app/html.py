@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from bns.diagnose.estimate.plausibility import with_unit
 from bns.diagnose.predict.paired_errors import Change, HorizonErrors, PairedErrors
 from bns.diagnose.report.plain_language import figures_in_words
 from bns.diagnose.report.tables import ahead
 from bns.physics.effect import Effect
+from bns.physics.figures import with_unit
 
 _SMALL = re.compile(r"[-+]?[\d.]+e-\d+")
 """A number with a hyphen in it."""

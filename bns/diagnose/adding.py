@@ -18,7 +18,7 @@ from bns.diagnose.estimate.cross_validation import AS_GIVEN, Judged, held_out_st
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.fit_set import Tried, fit_set
 from bns.diagnose.estimate.fitting import Problem
-from bns.diagnose.estimate.plausibility import does_nothing, fitted_again, implausible, with_unit
+from bns.diagnose.estimate.plausibility import does_nothing, fitted_again, implausible
 from bns.diagnose.estimate.problem import given_steps, problem_for
 from bns.diagnose.estimate.starts import fitting
 from bns.diagnose.parallel import one_thread_each
@@ -28,6 +28,7 @@ from bns.diagnose.predict.paired_errors import PairedErrors, PairedWindows
 from bns.errors import ModelError, in_both
 from bns.physics.effect import Effect
 from bns.physics.effects import effect_in_file
+from bns.physics.figures import with_unit
 from bns.physics.formula import formula_effect
 from bns.physics.jointed.model import JointedModel
 from bns.physics.model import ActiveEffect, Model

@@ -21,7 +21,7 @@ from bns.diagnose.effect_caveats import (
     on_the_cone,
 )
 from bns.diagnose.estimate.cancelling import cancelled
-from bns.diagnose.estimate.plausibility import does_no_more, with_unit
+from bns.diagnose.estimate.plausibility import does_no_more
 from bns.diagnose.estimate.single_wheel import single_wheel
 from bns.diagnose.outcome import Outcome
 from bns.diagnose.predict.horizons import IN_WORDS
@@ -33,6 +33,7 @@ from bns.diagnose.residuals.unexplained import Unexplained
 from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.result import Candidate, SelectionResult
 from bns.diagnose.settings import DEFAULTS
+from bns.physics.figures import mm, with_unit
 from bns.physics.jointed.model import JointedModel
 
 MOST_EFFECTS = DEFAULTS.select.most_effects
@@ -147,7 +148,7 @@ def _on_undescribed(found: Outcome) -> Iterator[str]:
         return
     known = {h: one for h, one in found.errors.horizons.items() if one.models and one.noise_floor_m > 0}
     at = max(known, key=lambda h: known[h].models[-1].rms_m / known[h].noise_floor_m, default="")
-    error, noise = (f"{1e3 * m:.3g} mm" for m in (known[at].models[-1].rms_m, known[at].noise_floor_m)) if at else ("", "")
+    error, noise = (mm(m, 3) for m in (known[at].models[-1].rms_m, known[at].noise_floor_m)) if at else ("", "")
     sizes = f" (error over {IN_WORDS[at]}: {error}; by noise alone: {noise})" if at else ""
     it, them = ("it", "this effect") if len(names) == 1 else ("they", "these effects")
     yield (

@@ -10,7 +10,7 @@ from scipy.special import stdtr
 
 from bns.diagnose.data.stamps import stamp_scatter
 from bns.diagnose.data.tracks import Array, Tracks
-from bns.diagnose.estimate.plausibility import known_together, with_unit
+from bns.diagnose.estimate.plausibility import known_together
 from bns.diagnose.estimate.smoothing_tracker import LATE, smoothing_tracker
 from bns.diagnose.outcome import Outcome
 from bns.diagnose.predict.horizons import IN_WORDS
@@ -23,6 +23,7 @@ from bns.diagnose.select.variants import order_of_friction, uncertain_variants
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import numbers_of, tied_sets, without_width
 from bns.physics.effect import Effect, Parameter
+from bns.physics.figures import with_unit
 from bns.physics.jointed.mechanism import machine
 from bns.physics.jointed.model import JointedModel
 from bns.physics.model import Model

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -240,6 +241,11 @@ class Effect:
         """The values at which the effect changes nothing."""
         return {p.name: p.neutral for p in self.parameters}
 
+    @cached_property
+    def is_own(self) -> bool:
+        """Is what it does written by a user, not in this package? Then it is watched (`bns.physics.applied`)."""
+        return of_user(self.apply)
+
     def checked(self, values: Mapping[str, object]) -> tuple[float, ...]:
         """All values in the order of `parameters`; ModelError if one is missing, unknown or out of bounds."""
         names = [p.name for p in self.parameters]
@@ -252,6 +258,13 @@ class Effect:
                 f"{self.name} lacks {', '.join(missing)}; it needs a value for each of {', '.join(names)}."
             )
         return tuple(number(f"{self.name}: {p.name}", values[p.name], p.low, p.high) for p in self.parameters)
+
+
+def of_user(function: Callable[..., Any]) -> bool:
+    """Is it written outside this package?"""
+    while isinstance(function, partial):
+        function = function.func
+    return not str(getattr(function, "__module__", "")).startswith("bns.")
 
 
 def number(where: str, value: object, low: float, high: float) -> float:

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from bns.diagnose.estimate.fit import Fit
-from bns.diagnose.estimate.plausibility import with_unit
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Parameter
+from bns.physics.figures import with_unit
 
 OUTGROWN = DEFAULTS.verdict.outgrown
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,7 +35,7 @@ from bns.diagnose.estimate.significance import PairedComparison, chance, jackkni
 from bns.diagnose.predict.base import Predictor, Steps
 from bns.diagnose.settings import DEFAULTS
 from bns.engine.pose_filter import TRUSTED
-from bns.errors import ModelError
+from bns.errors import EffectError, ModelError
 from bns.physics.model import Model
 
 _LATELY = 16
@@ -201,12 +200,21 @@ class Problem:
         """Where a step leads that does not raise the loss, and the damping for the next; None if there is none."""
         for _ in range(8):
             step = damped_step(*equations, damping)
-            with suppress(ModelError):  # a formula has no value there
-                there = self._point(self._moved(at.model, free, reduced, step, damping))
-                if np.isfinite(there.loss) and there.loss <= at.loss:
-                    return there, max(damping / 10, 1e-9)
+            there = self._stepped(at, free, reduced, step, damping)
+            if there is not None and np.isfinite(there.loss) and there.loss <= at.loss:
+                return there, max(damping / 10, 1e-9)
             damping *= 10
         return None
+
+    def _stepped(
+        self, at: _Point, free: Sequence[FreeParameter], reduced: ReducedJacobian, step: Array, damping: float
+    ) -> _Point | None:
+        try:
+            return self._point(self._moved(at.model, free, reduced, step, damping))
+        except EffectError:
+            raise
+        except ModelError:  # a formula has no value there
+            return None
 
     def _moved(
         self, model: Model, free: Sequence[FreeParameter], reduced: ReducedJacobian, step: Array, damping: float

@@ -12,6 +12,7 @@ from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.pseudo_inverse import pseudo_inverse
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Parameter
+from bns.physics.figures import with_unit
 from bns.physics.model import Model
 
 CHANCE = DEFAULTS.estimate.together_chance
@@ -174,11 +175,6 @@ def fitted_again(before: Model, fit: Fit, contradicted: bool = False) -> Iterato
         if changed:
             place = "" if longer == name else f" as part of {longer}, which takes its place"
             yield f"{name} was {active.basis} ({was}); its parameters were fitted again with the others{place}: {now}."
-
-
-def with_unit(unit: str) -> str:
-    """The unit behind a blank; nothing for a bare number."""
-    return "" if unit == "1" else f" {unit}"
 
 
 def _stopped(p: Parameter, value: float) -> bool:

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from bns.diagnose.estimate.fit import Fit
+from bns.physics.figures import figures, figures_apart
 
 _GAIN = ("speed-gain", "gain")
 _RATIOS = {"wheel-mismatch": "turns", "wheel-diameters": "is"}
@@ -34,12 +35,14 @@ def single_wheel(fit: Fit) -> Iterator[str]:
     other = int(np.flatnonzero(~same)[0])
     sides = ("left", "right")
     change, by = 100 * (factors[other] - 1.0), 100 * half[other]
+    low, high = abs(change) - by, abs(change) + by
+    needed = figures_apart(low, high)
+    size, least, most = (figures(value, needed) for value in (abs(change), low, high))
     if name == "wheel-diameters":
-        what = f"{abs(change):.2g} % {'larger' if change > 0 else 'smaller'} than in the model"
+        what = f"{size} % {'larger' if change > 0 else 'smaller'} than in the model"
     else:
-        what = f"{abs(change):.2g} % {'faster' if change > 0 else 'slower'} than commanded"
-    low, high = sorted((abs(change) - by, abs(change) + by))
+        what = f"{size} % {'faster' if change > 0 else 'slower'} than commanded"
     yield (
         f"speed-gain and {name} together say that the {sides[1 - other]} wheel is as in the model, and that the {sides[other]} "
-        f"one {_RATIOS[name]} {what} (95 %: {low:.2g} to {high:.2g} %): one cause, such as a worn wheel, may be behind both."
+        f"one {_RATIOS[name]} {what} (95 %: {least} to {most} %): one cause, such as a worn wheel, may be behind both."
     )

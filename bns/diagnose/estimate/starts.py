@@ -16,7 +16,7 @@ from bns.diagnose.estimate.look_around import lower_place
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.settings import DEFAULTS
-from bns.errors import ModelError
+from bns.errors import EffectError, ModelError
 from bns.physics.effect import Effect, Parameter
 from bns.physics.model import Model
 from bns.physics.order import FORMULAS, FRICTION, RAMPS
@@ -160,6 +160,8 @@ def _losses(problem: Problem, starts: Sequence[Model]) -> list[float]:
     for start in starts:
         try:
             out.append(problem.loss(start))
+        except EffectError:
+            raise
         except ModelError as error:
             out.append(np.inf)
             wrong = error

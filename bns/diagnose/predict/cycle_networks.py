@@ -13,6 +13,7 @@ from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.predict.base import Steps
 from bns.diagnose.settings import DEFAULTS
 from bns.engine.snn import predict
+from bns.physics.applied import applied
 from bns.physics.model import Model
 from bns.physics.signals import Body
 from bns.robots.simulator import StaticSimulator
@@ -56,7 +57,7 @@ class CyclePredictor:
         zero = np.zeros_like(self._step_s)
         body = Body(zero, zero, zero, (self._step_s > 0).astype(float), zero, zero, zero)
         for active in model.at("body"):
-            body = active.effect.apply(body, **active.by_name)
+            body = applied(active.effect, body, active.by_name)
         rates = np.stack([body.forward_m_s, -body.sideways_m_s, body.yaw_rad_s], axis=2) * self._step_s[..., None]
         added = rates[self.tracks.trial, np.maximum(self._at - 1, 0)]
         added[self.tracks.is_first] = 0.0

@@ -18,6 +18,7 @@ from bns.diagnose.predict.responses import Responses
 from bns.diagnose.predict.stretches import Simulations
 from bns.diagnose.settings import DEFAULTS
 from bns.engine.pose_filter import displacements
+from bns.physics.applied import applied
 from bns.physics.effect import Effect
 from bns.physics.jointed.model import JointedModel
 from bns.physics.jointed.plant import Plant, Sighting
@@ -212,7 +213,7 @@ class JointedPredictor:
         seen = self._responses.seen(model)
         sighting = Sighting(seen[:, 0], seen[:, 1], seen[:, 2])
         for active in model.at("sight"):
-            sighting = active.effect.apply(sighting, **active.by_name)
+            sighting = applied(active.effect, sighting, active.by_name)
         since = self._stretches.since_s
         if any(model.at("clock")):
             inner = np.isfinite(since) & (since > 0)
@@ -233,7 +234,7 @@ class JointedPredictor:
         place = np.stack([self._on_grid(self.tracks.pose[:, i]) for i in range(3)], axis=2)
         state = Body(rates[0], rates[1], rates[2], moving, rates[0], rates[0], session, place)
         for active in model.at("body"):
-            state = active.effect.apply(state, **active.by_name)
+            state = applied(active.effect, state, active.by_name)
         ways = np.stack([state.forward_m_s, -state.sideways_m_s, state.yaw_rad_s], axis=2) * self._step_s[..., None]
         out = ways[self.tracks.trial, np.maximum(self._at - 1, 0)]
         out[self.tracks.is_first] = 0.0

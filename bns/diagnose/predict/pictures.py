@@ -8,6 +8,7 @@ import numpy as np
 
 from bns.diagnose.data.tracks import Array
 from bns.diagnose.settings import DEFAULTS
+from bns.physics.applied import applied
 from bns.physics.model import ActiveEffect
 from bns.physics.signals import View
 
@@ -21,7 +22,7 @@ def pictured(placed: Sequence[ActiveEffect], poses: Array) -> Array:
     """Poses (frames, 3) as effects of the stage ``measure`` show them."""
     view = View(poses)
     for active in placed:
-        view = active.effect.apply(view, **active.by_name)
+        view = applied(active.effect, view, active.by_name)
     return view.poses
 
 

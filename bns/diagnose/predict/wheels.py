@@ -18,6 +18,7 @@ from bns.diagnose.predict.luck import Luck
 from bns.diagnose.predict.pictures import pictured, undone
 from bns.diagnose.settings import DEFAULTS
 from bns.engine.pose_filter import displacements, followed
+from bns.physics.applied import applied, starts_of
 from bns.physics.effect import Effect
 from bns.physics.model import ActiveEffect, Model
 from bns.physics.signals import Body, Conditions, Logged, View, Wheels
@@ -109,7 +110,7 @@ class WheelPredictor:
         view, placed = View(tracker(poses)), [active for active in model.at("measure") if active.effect.needs_place]
         for active in model.at("measure"):
             if not active.effect.needs_place:
-                view = active.effect.apply(view, **active.by_name)
+                view = applied(active.effect, view, active.by_name)
         body = displacements(view.poses, self.tracks.is_first)
         return Steps(self._pictured(body, placed) if placed else body, self._drift(model, poses, sums))
 
@@ -171,7 +172,7 @@ class WheelPredictor:
         if known not in self._starts and effect.starts_from is not None:
             turned = self._wheels(model.wheelbase_m, chain)
             given = Wheels(self.grid.step_s, turned.left_m_s, turned.right_m_s, model.wheelbase_m, self.conditions)
-            self._starts[known] = effect.starts_from(given) or (tuple(effect.neutral.values()),)
+            self._starts[known] = starts_of(effect, given) or (tuple(effect.neutral.values()),)
         return self._starts[known]
 
     def windows(self, horizon: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from bns.diagnose.report.people import for_people
 from bns.diagnose.settings import DEFAULTS
+from bns.physics.applied import words_of
 from bns.physics.effect import Effect, Parameter
 
 _BY_FACTOR = DEFAULTS.report.by_factor
@@ -24,7 +25,7 @@ def sized_sentence(effect: Effect, numbers: Mapping[str, Mapping[str, Any]]) -> 
         each = [numbers.get(p.name, {}) for p in effect.parameters]
         readable = all(n.get("value") is not None and _alone(n) for n in each)
         values = {p.name: float(n["value"]) for p, n in zip(effect.parameters, each, strict=True)} if readable else {}
-        return (effect.sized_by(values) if values else "") or effect.in_words
+        return (words_of(effect, values) if values else "") or effect.in_words
     if not effect.sized:
         return effect.in_words
     known = {p.name: p for p in effect.parameters}

@@ -15,7 +15,6 @@ from bns.diagnose.design.competing_models import Rival
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.effect_caveats import implausible_text
 from bns.diagnose.estimate.calibration import wheel_sizes
-from bns.diagnose.estimate.plausibility import with_unit
 from bns.diagnose.predict.paired_errors import Change, PairedErrors
 from bns.diagnose.report.plain_language import ABOVE_NOISE, further_notes, nothing_above_noise
 from bns.diagnose.report.sized import sized_sentence
@@ -25,6 +24,7 @@ from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import numbers_of, numbers_of_term, ties_of, without_width
 from bns.physics.decoys import DECOYS
 from bns.physics.effect import Effect
+from bns.physics.figures import figures_apart, with_unit
 
 _VERDICTS = {
     "none": "Nothing is missing that these measurements could show.",
@@ -203,7 +203,14 @@ def _number(name: str, n: Mapping[str, Any]) -> str:
         return f"{said} (no interval: {why})"
     mean = ", perhaps only the mean of delays that differ: see the notes" if n.get("of_mean") else ""
     beside = ", together with the free term only: see the notes" if n.get("cancels") else mean
-    return f"{said} (95 %: {n['low']:.5g} to {n['high']:.5g}{beside})"
+    low, high = _ends(n["low"], n["high"])
+    return f"{said} (95 %: {low} to {high}{beside})"
+
+
+def _ends(low: float, high: float) -> tuple[str, str]:
+    """The ends of an interval, in enough figures that they differ."""
+    count = figures_apart(low, high, 5)
+    return f"{low:.{count}g}", f"{high:.{count}g}"
 
 
 def _errors(errors: PairedErrors | None) -> Iterator[str]:

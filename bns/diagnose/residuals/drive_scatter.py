@@ -9,6 +9,7 @@ from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.horizons import IN_WORDS
 from bns.diagnose.predict.paired_errors import PairedErrors
 from bns.diagnose.settings import DEFAULTS
+from bns.physics.figures import mm
 
 NOTABLE = DEFAULTS.verdict.scatter_notable
 EXPLAINS = DEFAULTS.verdict.scatter_explains
@@ -64,9 +65,9 @@ def scatter_in_words(predictor: Predictor, noise: Array, errors: PairedErrors) -
     explained = np.hypot(by_drive, floor) / error
     if explained >= 1.0 / EXPLAINS:
         return [
-            f"The error over {IN_WORDS[horizon]} ({1e3 * error:.3g} mm) is far above tracking noise ({1e3 * floor:.3g} mm), and "
+            f"The error over {IN_WORDS[horizon]} ({mm(error, 3)}) is far above tracking noise ({mm(floor, 3)}), and "
             "no listed effect and no curve finds a pattern in it. From pose to pose, the track scatters by more: a drive "
-            f"that scatters so would be {1e3 * by_drive:.3g} mm off. So its jumps take one another back, or are rare: look for a "
+            f"that scatters so would be {mm(by_drive, 3)} off. So its jumps take one another back, or are rare: look for a "
             "tracker whose errors last for some poses (a hidden marker, a seam between two cameras), or for something that "
             "happens at moments, such as a wheel that sticks."
         ]
@@ -75,23 +76,23 @@ def scatter_in_words(predictor: Predictor, noise: Array, errors: PairedErrors) -
         longer = by_drive * _longer(predictor, noise, errors, over)
         if 1.0 / EXPLAINS > np.hypot(longer, floor) / error > EXPLAINS:
             return [
-                f"The error over {IN_WORDS[horizon]} ({1e3 * error:.3g} mm) is above tracking noise ({1e3 * floor:.3g} mm) "
+                f"The error over {IN_WORDS[horizon]} ({mm(error, 3)}) is above tracking noise ({mm(floor, 3)}) "
                 f"as if the drive itself scattered: grown as a walk at random grows, the error over {IN_WORDS[over]} makes "
-                f"{1e3 * longer:.3g} mm. From pose to pose it scatters less ({1e3 * by_drive:.3g} mm), as wheels do whose "
+                f"{mm(longer, 3)}. From pose to pose it scatters less ({mm(by_drive, 3)}), as wheels do whose "
                 "speeds vary over parts of a second, or a robot that something slow pushes. No listed effect and no curve finds "
                 "a pattern in it. Drive the same commands several times: what they share, a model can predict."
             ]
         return [
-            f"The error over {IN_WORDS[horizon]} ({1e3 * error:.3g} mm) is far above tracking noise ({1e3 * floor:.3g} mm), and "
-            f"a drive that scatters as this one does from pose to pose makes only {1e3 * by_drive:.3g} mm. "
+            f"The error over {IN_WORDS[horizon]} ({mm(error, 3)}) is far above tracking noise ({mm(floor, 3)}), and "
+            f"a drive that scatters as this one does from pose to pose makes only {mm(by_drive, 3)}. "
             "In the rest no listed effect and no curve finds a pattern: trials may differ from one another, or something happens "
             "at single speeds or for moments. Drive the same commands several times: how far these differ, no model can predict."
         ]
-    ahead, aside, turn = 1e3 * noise[2], 1e3 * noise[3], np.degrees(noise[4])
+    ahead, aside, turn = noise[2], noise[3], np.degrees(noise[4])
     return [
-        f"The error over {IN_WORDS[horizon]} ({1e3 * error:.3g} mm) is above tracking noise ({1e3 * floor:.3g} mm) as if the "
-        f"drive itself scattered: by {ahead:.3g} mm ahead, {aside:.3g} mm to the side and {turn:.3g}° in the first metre, and "
-        f"with the root of the way, which makes {1e3 * by_drive:.3g} mm. No listed effect and no curve finds a pattern in it. "
+        f"The error over {IN_WORDS[horizon]} ({mm(error, 3)}) is above tracking noise ({mm(floor, 3)}) as if the "
+        f"drive itself scattered: by {mm(ahead, 3)} ahead, {mm(aside, 3)} to the side and {turn:.3g}° in the first metre, and "
+        f"with the root of the way, which makes {mm(by_drive, 3)}. No listed effect and no curve finds a pattern in it. "
         "It may be chance, such as wheels that slip, or finer than these look, such as joints of a floor. Drive the same "
         "commands from the same place several times: what they share, a model can predict."
     ]
@@ -110,7 +111,7 @@ def still_left_in_words(predictor: Predictor, noise: Array, errors: PairedErrors
     if np.hypot(wandering_m(predictor, noise, horizon), floor) > EXPLAINS * error:
         return []
     return [
-        f"With all of this the error over {IN_WORDS[horizon]} is still {1e3 * error:.3g} mm (as given {1e3 * given:.3g} mm, by "
-        f"tracking noise {1e3 * floor:.3g} mm), so not all that happens is described. Something may have a state that no column "
+        f"With all of this the error over {IN_WORDS[horizon]} is still {mm(error, 3)} (as given {mm(given, 3)}, by "
+        f"tracking noise {mm(floor, 3)}), so not all that happens is described. Something may have a state that no column "
         "shows, such as a load that has shifted or parts that have warmed up, or may happen at moments: log what could show it."
     ]

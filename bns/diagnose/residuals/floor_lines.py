@@ -24,6 +24,7 @@ from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.unforeseen import unforeseen
 from bns.diagnose.settings import DEFAULTS
+from bns.physics.figures import mm
 
 LEAST_Z = DEFAULTS.residuals.line_z
 STEP_DEG = DEFAULTS.residuals.line_step_deg
@@ -60,7 +61,7 @@ class FloorLines:
     @property
     def in_words(self) -> str:
         """What happens where, as a clause."""
-        what = f"loses about {1e3 * self.loss_m:.2g} mm" if self.loss_m >= 0 else f"gains about {-1e3 * self.loss_m:.2g} mm"
+        what = f"loses about {mm(self.loss_m)}" if self.loss_m >= 0 else f"gains about {mm(-self.loss_m)}"
         even = f", {self.spacing_m:.3g} m apart" if self.spacing_m is not None else ""
         return f"a wheel {what} of its way where it crosses a line on the floor, at {self._where}{even}"
 

@@ -11,6 +11,7 @@ from bns.diagnose.predict.base import Predictor
 from bns.diagnose.residuals.grammar import RESPONSE_KNOTS_S
 from bns.diagnose.residuals.phrases import POINTS, VELOCITIES, curve_of, slower
 from bns.diagnose.residuals.symbolic import Formula
+from bns.physics.figures import mm
 from bns.physics.formula import LEFT, RIGHT, value_of
 
 _RESPONDS = {"wheels": ("u", "a wheel"), "v": ("v", "the robot's forward motion"), "w": ("w", "the robot's turning")}
@@ -88,7 +89,7 @@ def reversal(term: Formula, _: Predictor) -> str:
     way = np.linspace(0.0, 1.0, 10 * POINTS)
     lost = -float(np.trapezoid(curve_of(term, "since", way, u=1.0), way))
     verb = "loses" if lost >= 0 else "gains"
-    return f"a wheel {verb} {1e3 * abs(lost):.3g} mm of its distance whenever it changes direction"
+    return f"a wheel {verb} {mm(abs(lost), 3)} of its distance whenever it changes direction"
 
 
 def swing(term: Formula, _: Predictor) -> str:

@@ -10,6 +10,7 @@ from bns.diagnose.residuals.grammar import PULL
 from bns.diagnose.residuals.phrases import POINTS, VELOCITIES, curve_of, seconds, slower
 from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.settings import DEFAULTS
+from bns.physics.figures import figures
 from bns.physics.formula import LEFT, RIGHT, SHARE, value_of
 
 _ENDS = DEFAULTS.report.surface_ends
@@ -47,7 +48,7 @@ def drift(term: Formula, predictor: Predictor) -> str:
     change = np.degrees(curve_of(term, "t", grid, moving=1.0))
     most = int(np.abs(change).argmax())
     side = "left" if change[most] > 0.0 else "right"
-    turns = f"the robot turns {abs(change[most]):.2g} °/s further to the {side}"
+    turns = f"the robot turns {figures(abs(change[most]))} °/s further to the {side}"
     return f"{turns} at {seconds(grid[most])} of the session than at its beginning, whenever it moves"
 
 

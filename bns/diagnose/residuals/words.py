@@ -46,6 +46,7 @@ from bns.diagnose.residuals.places_in_words import (
 )
 from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.settings import DEFAULTS
+from bns.physics.figures import figures
 from bns.physics.formula import LEFT, NEVER_M, RIGHT, SHARE, names_in, value_of
 from bns.physics.model import Model
 
@@ -194,18 +195,18 @@ def _slower_share(change: float) -> str:
 
 
 def _slower_turn(change: float) -> str:
-    return f"{'slower' if change <= 0 else 'faster'} by {abs(np.degrees(change)):.2g} °/s"
+    return f"{'slower' if change <= 0 else 'faster'} by {figures(abs(np.degrees(change)))} °/s"
 
 
 def _slower_way(change: float) -> str:
-    return f"{'slower' if change <= 0 else 'faster'} by {1e3 * abs(change):.2g} mm/s"
+    return f"{'slower' if change <= 0 else 'faster'} by {figures(1e3 * abs(change))} mm/s"
 
 
 def _steps(term: Formula, _: Predictor) -> str:
     speeds = np.linspace(0.0, 1.0, 100 * POINTS)
     jumps = np.flatnonzero(np.diff(curve_of(term, "u", speeds)) > 0)
     step = float(np.median(np.diff(speeds[jumps]))) if len(jumps) > 1 else float("nan")
-    return f"wheel speeds come in steps of {1e3 * step:.3g} mm/s"
+    return f"wheel speeds come in steps of {figures(1e3 * step, 3)} mm/s"
 
 
 def _largest(term: Formula, predictor: Predictor) -> str:
@@ -226,7 +227,7 @@ def _largest(term: Formula, predictor: Predictor) -> str:
     size = float(np.quantile(change[np.isfinite(change)], 0.95))
     if term.on == SHARE:
         return f"by up to {size:.2%}"
-    return f"by up to {np.degrees(size):.3g} °/s" if term.on == "w" else f"by up to {1e3 * size:.3g} mm/s"
+    return f"by up to {figures(np.degrees(size), 3)} °/s" if term.on == "w" else f"by up to {figures(1e3 * size, 3)} mm/s"
 
 
 _SAID: dict[tuple[str, str], Callable[[Formula, Predictor], str]] = {

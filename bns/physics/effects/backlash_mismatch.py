@@ -9,6 +9,7 @@ from collections.abc import Mapping
 
 from bns.physics.effect import Effect, Parameter
 from bns.physics.effects.backlash_start import EFFECT as ALIKE
+from bns.physics.figures import figures
 from bns.physics.signals import Wheels
 from bns.physics.wheels.scans import played
 
@@ -33,8 +34,8 @@ def sized_by(values: Mapping[str, float]) -> str:
     left = values["gap_m"] * values["left_share"]
     sides = {"left": 1e3 * left, "right": 1e3 * (2.0 * values["gap_m"] - left)}
     more, less = sorted(sides, key=sides.__getitem__, reverse=True)
-    other = f"for {sides[less]:.2g} mm" if sides[less] > _NOTABLE * sides[more] else "hardly"
-    said = f"play in the gears stops the {more} wheel for {sides[more]:.2g} mm of its way whenever it changes direction"
+    other = f"for {figures(sides[less])} mm" if sides[less] > _NOTABLE * sides[more] else "hardly"
+    said = f"play in the gears stops the {more} wheel for {figures(sides[more])} mm of its way whenever it changes direction"
     return f"{said}, and the {less} one {other}"
 
 

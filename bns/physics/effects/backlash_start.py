@@ -9,6 +9,7 @@ from collections.abc import Mapping
 
 from bns.physics.effect import Effect, Parameter
 from bns.physics.effects.backlash import EFFECT as FORWARD
+from bns.physics.figures import figures, mm
 from bns.physics.signals import Wheels
 from bns.physics.wheels.scans import played
 
@@ -25,8 +26,8 @@ def sized_by(values: Mapping[str, float]) -> str:
     """With the way that is lost before a trial's first motion forwards."""
     first_mm = 1e3 * values["gap_m"] * (1.0 - values["crossed_share"])
     return (
-        f"play in the gears stops a wheel for {1e3 * values['gap_m']:.2g} mm of its way whenever it changes direction, and for "
-        f"{first_mm:.2g} mm when a trial begins forwards"
+        f"play in the gears stops a wheel for {mm(values['gap_m'])} of its way whenever it changes direction, and for "
+        f"{figures(first_mm)} mm when a trial begins forwards"
     )
 
 

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from bns.physics.effect import Effect, Parameter
+from bns.physics.figures import mm
 from bns.physics.signals import Body, Wheels
 from bns.physics.wheels.joints import Joints, crossed, rows_of_joints
 
@@ -49,7 +50,7 @@ def sized_by(values: Mapping[str, float]) -> str:
 
 def lost_by(values: Mapping[str, float]) -> str:
     """How much of its way a wheel loses at one of the first row."""
-    return f"a wheel {'loses' if values['loss_m'] >= 0 else 'gains'} {1e3 * abs(values['loss_m']):.2g} mm of its way"
+    return f"a wheel {'loses' if values['loss_m'] >= 0 else 'gains'} {mm(abs(values['loss_m']))} of its way"
 
 
 def _starts_from(wheels: Wheels) -> tuple[tuple[float, ...], ...]:

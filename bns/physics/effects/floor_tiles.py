@@ -12,6 +12,7 @@ import numpy as np
 from bns.physics.effect import Effect, Parameter
 from bns.physics.effects.floor_joints import EFFECT as ROW
 from bns.physics.effects.floor_joints import losing, lost_by
+from bns.physics.figures import figures
 from bns.physics.signals import Body, Wheels
 from bns.physics.wheels.joints import Joints, rows_of_joints
 
@@ -51,7 +52,7 @@ def sized_by(values: Mapping[str, float]) -> str:
     """What a wheel loses, or gains, at a joint of either row."""
     second_mm = 1e3 * abs(values["second_share"] * values["loss_m"])
     said = f"{lost_by(values)} at each joint between tiles that are {values['spacing_m']:.3g} m wide"
-    return said if 0.8 < values["second_share"] < 1.25 else f"{said} ({second_mm:.2g} mm at those of the second row)"
+    return said if 0.8 < values["second_share"] < 1.25 else f"{said} ({figures(second_mm)} mm at those of the second row)"
 
 
 EFFECT = Effect(

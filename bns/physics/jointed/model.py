@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from bns.errors import ModelError, unknown_name
+from bns.physics.applied import applied
 from bns.physics.effect import REFERENCE_WHEELBASE_M, Effect
 from bns.physics.jointed.catalogue import catalogue
 from bns.physics.jointed.mechanism import Mechanism, machine
@@ -56,13 +57,13 @@ class JointedModel(Model):
         """Servos, links and floor with the effects switched on."""
         plant = machine(self.mechanism).plant
         for active in self.at("mechanics"):
-            plant = active.effect.apply(plant, **active.by_name)
+            plant = applied(active.effect, plant, active.by_name)
         return plant
 
     def seen(self, sighting: Sighting) -> Sighting:
         """What the camera makes of it."""
         for active in self.at("sight"):
-            sighting = active.effect.apply(sighting, **active.by_name)
+            sighting = applied(active.effect, sighting, active.by_name)
         return sighting
 
     def canonical_json(self) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bns.errors import ModelError
+from bns.physics.applied import applied
 from bns.physics.model import Model
 from bns.physics.signals import Array, Stamps, View
 from bns.physics.wheels.grid import Grid, step_grid
@@ -96,7 +97,7 @@ def observe(poses: ArrayLike, normals: ArrayLike | None, model: Model) -> Array:
     if seen.poses.shape[-1:] != (3,):
         raise ModelError(f"poses have shape {seen.poses.shape}; the last axis must be x_m, y_m, heading_rad.")
     for active in model.at("measure"):
-        seen = active.effect.apply(seen, **active.by_name)
+        seen = applied(active.effect, seen, active.by_name)
     if normals is None:
         return seen.poses
     sigma = np.array([model.noise_position_m, model.noise_position_m, model.noise_heading_rad])
@@ -136,7 +137,7 @@ def stamps_of(model: Model, stamped_s: Array, trial: NDArray[np.int64] | None = 
         values: dict[str, Any] = dict(active.by_name)
         if active.trial_values and trial is not None:
             values = dict.fromkeys(values, np.array(active.trial_values)[trial])
-        stamps = active.effect.apply(stamps, **values)
+        stamps = applied(active.effect, stamps, values)
     return stamps
 
 

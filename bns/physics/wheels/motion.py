@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bns.physics.applied import applied
 from bns.physics.model import Model
 from bns.physics.signals import NO_CONDITIONS, Array, Body, Conditions, Flow, Wheels
 from bns.physics.wheels.grid import Grid
@@ -34,14 +35,14 @@ def wheel_motion(model: Model, grid: Grid, conditions: Conditions = NO_CONDITION
     """Velocities of a body whose wheels turn under the model's ``wheel`` effects and do not slip."""
     wheels = Wheels(grid.step_s, grid.left_m_s, grid.right_m_s, model.wheelbase_m, conditions)
     for active in model.at("wheel"):
-        wheels = active.effect.apply(wheels, **active.by_name)
+        wheels = applied(active.effect, wheels, active.by_name)
     return _body(wheels)
 
 
 def with_body_effects(model: Model, body: Body) -> Body:
     """What the model's ``body`` effects make of it."""
     for active in model.at("body"):
-        body = active.effect.apply(body, **active.by_name)
+        body = applied(active.effect, body, active.by_name)
     return body
 
 
@@ -49,7 +50,7 @@ def flow_of(model: Model) -> Flow:
     """What the model's ``world`` effects add to every velocity while the robot moves."""
     flow = Flow()
     for active in model.at("world"):
-        flow = active.effect.apply(flow, **active.by_name)
+        flow = applied(active.effect, flow, active.by_name)
     return flow
 
 

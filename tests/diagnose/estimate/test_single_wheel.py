@@ -40,6 +40,11 @@ def test_one_wheel_that_is_as_in_the_model_is_told(left, right, said):
     assert all(text.startswith(f"speed-gain and wheel-mismatch together say {said}") for text in found)
 
 
+def test_a_narrow_interval_has_ends_that_differ():
+    (said,) = single_wheel(fit_of(0.96, 1.0, se=1e-5))
+    assert "turns 4 % slower than commanded (95 %: 3.997 to 4.003 %)" in said
+
+
 def test_errors_that_go_together_count():
     """With the gain too high where the ratio is too low the left wheel's factor is less certain, and the right one's more."""
     assert not list(single_wheel(fit_of(1.004, 0.975)))

@@ -98,7 +98,7 @@ def test_what_is_left_beside_terms_is_said_where_neither_noise_nor_scatter_makes
     predictor = robot(curved(), [(0, 199)])
     by_drive = wandering_m(predictor, NOISE, "5s")
     (said,) = still_left_in_words(predictor, NOISE, errors(1.7 * by_drive))
-    assert f"over 5 seconds is still {1.7e3 * by_drive:.3g} mm (as given 1e+03 mm, by tracking noise 2 mm)" in said
+    assert f"over 5 seconds is still {1.7e3 * by_drive:.3g} mm (as given 1000 mm, by tracking noise 2 mm)" in said
     assert "a load that has shifted" in said
     assert still_left_in_words(predictor, NOISE, errors(1.2 * by_drive)) == []  # the drive's own scatter
     assert still_left_in_words(predictor, NOISE, errors(1.7 * by_drive, floor_m=by_drive)) == []

@@ -1,0 +1,56 @@
+"""Numbers in sentences: no exponent at sizes that robots have, and ends of intervals that differ."""
+
+import pytest
+
+import bns
+from bns.diagnose.report.text import _number
+from bns.diagnose.residuals.floor_lines import FloorLines
+from bns.physics.effects import effect_named
+from bns.physics.figures import figures, figures_apart, mm
+
+WORDS = {
+    "backlash-start": (
+        {"gap_m": 0.4, "crossed_share": 0.0},
+        "for 400 mm of its way whenever it changes direction, and for 400 mm when",
+    ),
+    "backlash-mismatch": (
+        {"gap_m": 0.3, "left_share": 0.5, "crossed_share": 1.0},
+        "the right wheel for 450 mm of its way whenever it changes direction, and the left one for 150 mm",
+    ),
+    "floor-joints": ({"loss_m": 0.4, "spacing_m": 0.3}, "a wheel loses 400 mm of its way at each"),
+}
+
+
+@pytest.mark.parametrize(
+    ("value", "count", "said"),
+    [(400.0, 2, "400"), (4.56, 2, "4.6"), (0.0312, 2, "0.031"), (12345.0, 3, "12300"), (4.0, 2, "4"), (-450.0, 2, "-450")],
+)
+def test_figures_have_no_exponent(value, count, said):
+    assert figures(value, count) == said
+    assert mm(value / 1e3, count) == f"{said} mm"
+
+
+@pytest.mark.parametrize(("low", "high", "count"), [(3.98, 4.03, 3), (3.0, 4.0, 2), (3.99999, 4.00001, 6), (4.0, 4.0, 2)])
+def test_as_many_figures_as_set_two_ends_apart(low, high, count):
+    assert figures_apart(low, high) == count
+
+
+@pytest.mark.parametrize("name", WORDS)
+def test_sentences_of_effects_have_no_exponent(name):
+    values, said = WORDS[name]
+    assert said in effect_named(name).sized_by(values)
+
+
+def test_lines_on_a_floor_have_no_exponent():
+    assert "loses about 400 mm of its way" in FloorLines(0.0, (0.1,), None, 0.4, 5.0).in_words
+
+
+def test_an_interval_that_is_narrow_beside_its_number_has_two_ends():
+    number = {"value": 0.100002, "low": 0.100001, "high": 0.100004, "unit": "m"}
+    assert _number("width_m", number) == "width_m = 0.1 m (95 %: 0.100001 to 0.100004)"
+
+
+def test_a_bare_number_has_no_unit_in_the_summary_of_a_model():
+    said = bns.Model("khepera").with_effect("wheelbase", factor=1.1772).with_effect("motor-lag", tau_s=0.1).summary()
+    assert "wheelbase: factor = 1.1772 (guess)" in said
+    assert "motor-lag: tau_s = 0.1 s (guess)" in said
