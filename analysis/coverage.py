@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from analysis.labels import counted
 from analysis.results import Results, among, planned_runs
-from analysis.selection import failures, finished
+from analysis.selection import failures, finished, of_newest_files
 from bns.store.schema import PARAMETERS
 
 
@@ -53,5 +53,5 @@ def _finished_cells(store: Results, sweeps: Sequence[str]) -> int:
     return int(
         store.query(f"""SELECT count(*) AS n FROM (SELECT DISTINCT sweep, task, evaluations,
         {", ".join(name for name in PARAMETERS if name != "seed")}
-        FROM runs WHERE status = 'ok' AND {among("sweep", sweeps)})""").n[0]
+        FROM runs WHERE status = 'ok' AND {among("sweep", sweeps)} AND {of_newest_files(store)})""").n[0]
     )

@@ -11,6 +11,7 @@ import pandas as pd
 from analysis.approach_order import in_order
 from analysis.labels import CELL, TITLES, counted, task_order
 from analysis.results import BEGIN, NoDataError, Results, among, remembered
+from bns.spec import FIELDS
 from bns.sweep.confirm import confirmed_name
 
 CONFIRMING = confirmed_name("")
@@ -30,7 +31,10 @@ RUNS = """(SELECT *, regexp_extract(spec, '"engine_version":([0-9]+)', 1) AS eng
 
 @dataclass(frozen=True)
 class Selection:
-    """Runs of one robot that may be counted together: all finished ones of ``sweeps`` at one setting a task."""
+    """Runs of one robot that may be counted together: all finished ones of ``sweeps`` at one setting a task.
+
+    Of a sweep with several files, those that the newest one describes.
+    """
 
     robot: str
     tasks: tuple[str, ...]
@@ -69,7 +73,7 @@ def selections(store: Results, parameter: str | None = None) -> list[Selection]:
     sweeps = comparing(store, parameter)
     groups = store.query(f"""
         SELECT robot, task, {", ".join(SETTING)}, count(DISTINCT run_id) AS n FROM {RUNS}
-        WHERE status = 'ok' AND {among("sweep", sweeps)} GROUP BY ALL
+        WHERE status = 'ok' AND {among("sweep", sweeps)} AND {of_newest_files(store)} GROUP BY ALL
         ORDER BY n DESC, robot, task, {", ".join(SETTING)}""")
     if groups.empty:
         raise NoDataError(f"{_why_none(store, sweeps, parameter)}; run {BEGIN}")
@@ -80,7 +84,9 @@ def comparing(store: Results, parameter: str | None = None) -> list[str]:
     """Sweeps that compare values of ``parameter`` (of any of the four), by their plan or by their runs."""
     names = CELL if parameter is None else (parameter,)
     several = " OR ".join(f"count(DISTINCT {name}) > 1" for name in names)
-    rows = store.query(f"SELECT sweep, {several} AS several FROM runs GROUP BY sweep ORDER BY sweep")
+    rows = store.query(
+        f"SELECT sweep, {several} AS several FROM runs WHERE {of_newest_files(store)} GROUP BY sweep ORDER BY sweep"
+    )
     return [
         row.sweep
         for row in rows.itertuples()
@@ -92,11 +98,13 @@ def comparing(store: Results, parameter: str | None = None) -> list[str]:
 
 def _selection(store: Results, robot: str, groups: pd.DataFrame, sweeps: Sequence[str]) -> Selection:
     chosen = groups.drop_duplicates("task")
-    setting = " OR ".join(f"({_equals(row)})" for row in chosen[["robot", "task", *SETTING]].to_dict("records"))
+    alike = " OR ".join(f"({_equals(row)})" for row in chosen[["robot", "task", *SETTING]].to_dict("records"))
+    setting = f"({alike}) AND {of_newest_files(store)}"
     drawn = {str(row["task"]): row for row in chosen.to_dict("records")}
     others = groups.drop(chosen.index).to_dict("records")
-    left_out = tuple(
-        text for task, row in drawn.items() for text in _left_out(row, [one for one in others if one["task"] == task])
+    left_out = (
+        *(text for task, row in drawn.items() for text in _left_out(row, [one for one in others if one["task"] == task])),
+        *_of_earlier_files(store, robot, sweeps),
     )
     tasks = tuple(sorted(chosen.task, key=lambda task: task_order(robot, task)))
     rows = store.query(f"SELECT DISTINCT sweep FROM {RUNS} WHERE {among('sweep', sweeps)} AND status = 'ok' AND ({setting})")
@@ -121,6 +129,41 @@ def _left_out(drawn: dict[Hashable, Any], others: Sequence[dict[Hashable, Any]])
                 f"{row['generations_per_evaluation']} generations and {row['training_iterations_per_evaluation']} iterations "
                 f"each, or of {approach}another world, engine or other bounds, left out"
             )
+
+
+@remembered
+def of_newest_files(store: Results) -> str:
+    """SQL, of `runs`: the newest file of the sweep describes the run, where its name stands for several files.
+
+    Sweeps that confirm, or compare readings or worlds, grow file by file: theirs all count.
+    """
+    several = store.query("SELECT sweep FROM specs GROUP BY sweep HAVING count(DISTINCT spec_hash) > 1 ORDER BY sweep").sweep
+    sweeps = [name for name in several if not name.endswith(CONFIRMING) and not name.startswith((READINGS, WORLDS))]
+    earlier = [run for name in sweeps if store.plans[name].asked for run in _not_described(store, name)]
+    return f"NOT ({among('concat(sweep, chr(10), run_id)', earlier)})" if earlier else "true"
+
+
+def _not_described(store: Results, sweep: str) -> list[str]:
+    """Runs of ``sweep`` that its newest file does not ask for, whatever the engine: sweep and run_id in two lines."""
+    there = set(store.query("SELECT column_name FROM (DESCRIBE runs)").column_name)  # an archive keeps fewer columns
+    fields = [field for name, field in FIELDS.items() if name not in {"robot", "seed"}]
+    kept = [number for number, field in enumerate(fields) if field.name in there]
+    plan = store.plans[sweep]
+    asked = {(one[0], *(one[1 + number] for number in kept)) for one in plan.asked}
+    names = ", ".join(fields[number].name for number in kept)
+    rows = store.query(f"SELECT run_id, seed, robot, {names} FROM runs WHERE {among('sweep', [sweep])}")
+    return [
+        f"{sweep}\n{run_id}"
+        for run_id, seed, *combination in rows.itertuples(index=False, name=None)
+        if seed not in plan.numbers or tuple(combination) not in asked
+    ]
+
+
+def _of_earlier_files(store: Results, robot: str, sweeps: Sequence[str]) -> Iterator[str]:
+    rows = store.query(f"""SELECT sweep, count(DISTINCT run_id) AS n FROM runs WHERE status = 'ok' AND {among("robot", [robot])}
+        AND {among("sweep", sweeps)} AND NOT ({of_newest_files(store)}) GROUP BY sweep ORDER BY sweep""")
+    for row in rows.itertuples():
+        yield f"{counted(row.n, 'run')} of an earlier file of the name {row.sweep} left out"
 
 
 def _approach_drawn(by_task: dict[str, str]) -> str:
@@ -149,7 +192,10 @@ def _equals(values: dict[str, Any]) -> str:
 
 def finished(store: Results, sweeps: Sequence[str]) -> int:
     """How many different runs of ``sweeps`` are finished."""
-    rows = store.query(f"SELECT count(DISTINCT run_id) AS n FROM runs WHERE status = 'ok' AND {among('sweep', sweeps)}")
+    rows = store.query(
+        f"SELECT count(DISTINCT run_id) AS n FROM runs "
+        f"WHERE status = 'ok' AND {among('sweep', sweeps)} AND {of_newest_files(store)}"
+    )
     return int(rows.n[0])
 
 
@@ -157,5 +203,5 @@ def failures(store: Results, sweeps: Sequence[str]) -> int:
     """How many runs of ``sweeps`` broke and were not carried out again with success."""
     return int(
         store.query(f"""SELECT count(*) AS n FROM (SELECT run_id FROM runs WHERE {among("sweep", sweeps)}
-        GROUP BY run_id HAVING count(*) FILTER (status = 'ok') = 0)""").n[0]
+        AND {of_newest_files(store)} GROUP BY run_id HAVING count(*) FILTER (status = 'ok') = 0)""").n[0]
     )

@@ -10,10 +10,12 @@ from analysis.__main__ import figures
 from analysis.intervals import POOLED, pooled, wilson
 from analysis.results import NoDataError, Results
 from analysis.scatter import LEGEND_PT
+from analysis.selection import finished
 from bns.errors import SweepWarning
 from bns.plotting.style import COLUMN_IN, PAGE_IN, TEXT_PT
 from bns.spec import RunSpec
 from bns.store import Writer, load
+from bns.store.archive.write import archive
 
 ROUNDED = 5.1e-4
 """Figures take diversity and fitness to 0.001, as an archive keeps them."""
@@ -238,6 +240,28 @@ def test_runs_of_another_length_are_left_out_and_named(tmp_path):
     drawn = success_by_mutation.draw(Results(tmp_path))[0]
     assert drawn.n == 6
     assert any("4 runs of circle with 4 evaluations, 7 generations" in text for text in drawn.missing)
+
+
+def test_runs_of_an_earlier_file_of_the_sweep_are_left_out_and_stated(tmp_path):
+    text = "name: grid\nrobot: khepera\nseeds: {}\nfixed: {{evaluations: 4, task: circle}}\ngrid: {{mutation_rate: {}}}"
+    of_today = [RunSpec(seed=0, evaluations=4, mutation_rate=rate, task="circle") for rate in (0.1, 0.9)]
+    before = [record(spec) for spec in specs(3, task="circle")]
+    written(tmp_path, "grid", before, sweep_text=text.format(3, [0.1, 0.5]), sweep_runs=6)
+    assert success_by_mutation.draw(Results(tmp_path))[0].n == 6
+    written(tmp_path, "grid", [record(of_today[1])], sweep_text=text.format(1, [0.1, 0.9]), sweep_runs=2)
+    drawn = success_by_mutation.draw(Results(tmp_path))[0]
+    assert set(curves(drawn.figure)) == {"10 % (n = 1)", "90 % (n = 1)"}
+    assert drawn.missing == ("5 runs of an earlier file of the name grid left out",)
+    archive(tmp_path, tmp_path / "kept.parquet")
+    from_archive = success_by_mutation.draw(Results(tmp_path / "kept.parquet", archived=True))[0]
+    assert (from_archive.n, from_archive.missing) == (2, drawn.missing)
+
+
+def test_files_that_add_to_a_confirmation_all_count(tmp_path):
+    text = "name: grid-confirm\nrobot: khepera\nseeds: 1\nfixed: {{evaluations: 4, task: circle, mutation_rate: {}}}"
+    for spec in specs(1, task="circle"):
+        written(tmp_path, "grid-confirm", [record(spec)], sweep_text=text.format(spec.mutation_rate), sweep_runs=1)
+    assert finished(Results(tmp_path), ["grid-confirm"]) == 2
 
 
 def test_failed_and_planned_runs_are_stated_on_the_figure(tmp_path, texts):

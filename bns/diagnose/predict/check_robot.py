@@ -28,6 +28,7 @@ _ARC_RAD = DEFAULTS.predict.robot_arc_rad
 _TOGETHER = DEFAULTS.predict.robot_together
 _TURNED_RAD = DEFAULTS.predict.robot_turned_rad
 _AS_FAR = DEFAULTS.predict.robot_as_far
+_LATE_S, _LATE_ROUNDS = DEFAULTS.predict.robot_late
 
 
 def check_named_robot(robot: str, model: Model) -> None:
@@ -51,7 +52,7 @@ def check_same_robot(predictor: Predictor, model: Model) -> None:
     ratio = _turn_ratio(tracks, predicted, start, end, _EXPLAINED)
     if not 1 / _FACTOR <= ratio <= _FACTOR:
         _check_speeds(tracks, steps, start, end, ratio)
-        raise DataError(_on_turns(model, ratio, "Is this its model?"))
+        raise DataError(_on_turns(tracks, model, ratio, "Is this its model?"))
     arcs = np.abs(predicted) < _ARC_RAD
     _check_directions(tracks, start[arcs], end[arcs], np.cumsum(steps[:, 0]))
 
@@ -104,20 +105,22 @@ def hint_on_wheelbase(predictor: Predictor, model: Model) -> str:
         return ""
     predicted = _turn_predicted(predictor.steps(model).body, start, end)
     ratio = _turn_ratio(predictor.tracks, predicted, start, end, _HINT_EXPLAINED)
-    return _on_turns(model, ratio, "Is the wheelbase right?") if ratio > _HINT else ""
+    return _on_turns(predictor.tracks, model, ratio, "Is the wheelbase right?") if ratio > _HINT else ""
 
 
-def _on_turns(model: Model, ratio: float, question: str) -> str:
-    fits = model.wheelbase_m / ratio if ratio else float("inf")
+def _on_turns(tracks: Tracks, model: Model, ratio: float, question: str) -> str:
+    """``ratio``: how many times as far as predicted it turns in a second, which a lag alters."""
+    fits = suggested_wheelbase_m(tracks)
+    ratio = ratio if fits is None else model.wheelbase_m / fits
     low, high = LIMITS["wheelbase_m"]
     said = f"The robot turns {ratio:.2g} times as far as a model with a wheelbase of {model.wheelbase_m:g} m predicts."
-    if not low <= fits <= high:
+    if fits is None:
         return (
             f"{said} No wheelbase from {low:g} to {high:g} m would fit: is heading_rad the measured heading of the robot, in "
             "radians, and are the speeds in m/s?"
         )
-    given = in_both(f"--wheelbase {fits:.3g}", f"bns.Model(NAME, wheelbase_m={fits:.3g})")
-    return f"{said} {question} A wheelbase of about {fits:.3g} m would fit: {given}."
+    given = in_both(f"--wheelbase {fits:.4g}", f"bns.Model(NAME, wheelbase_m={fits:.4g})")
+    return f"{said} {question} A wheelbase of about {fits:.4g} m would fit: {given}."
 
 
 def _turn_predicted(steps: Array, start: NDArray[np.int64], end: NDArray[np.int64]) -> Array:
@@ -196,21 +199,45 @@ def _unmirrored(degrees: float) -> str:
 
 
 def suggested_wheelbase_m(tracks: Tracks) -> float | None:
-    """The wheelbase (m) with which a plain drive turns as these tracks do, over windows of a second.
+    """The wheelbase (m) with which a plain drive turns as these tracks do.
 
     None where they tell nothing, or a distance that no model may have. Turns of more than half a round between two poses would
     mislead it.
     """
     start, end = windows(tracks, "1s")
     told = np.cumsum(WheelPredictor(tracks).steps(Model(wheelbase_m=1.0)).body[:, 2])
-    heading = _unwrapped(tracks)
-    commanded, seen = told[end] - told[start], heading[end] - heading[start]
-    clear = np.abs(commanded) > _CLEAR_M
-    if clear.sum() < _FEWEST:
+    if (np.abs(told[end] - told[start]) > _CLEAR_M).sum() < _FEWEST:
         return None
-    ratio = _scale(seen[clear], commanded[clear])
+    heading = _unwrapped(tracks)
+    ratio = _in_the_end(
+        np.stack([_earlier(tracks, told, end, by_s) - _earlier(tracks, told, start, by_s) for by_s in _LATE_S], axis=1),
+        heading[end] - heading[start],
+    )
     low, high = LIMITS["wheelbase_m"]
     return float(1 / ratio) if ratio > 0 and low <= 1 / ratio <= high else None
+
+
+def _in_the_end(told: Array, seen: Array) -> float:
+    """How many times as far as told the robot turns, sooner or later: least absolute deviations of seen = told @ shares.
+
+    ``told`` (windows, times): in the second in which it turned ``seen``, and in earlier ones. Motors that lag, and commands that
+    come late, turn a share of each; the shares add up.
+    """
+    counts = np.ones(len(seen))
+    for _ in range(_LATE_ROUNDS):
+        shares = np.linalg.lstsq(told * counts[:, None], seen * counts, rcond=None)[0]
+        off = np.abs(seen - told @ shares)
+        counts = 1.0 / np.sqrt(np.maximum(off, max(float(np.median(off)), 1e-9)))
+    return float(shares.sum())
+
+
+def _earlier(tracks: Tracks, told: Array, frames: NDArray[np.int64], by_s: float) -> Array:
+    """What sums ``told`` (frames,) were so long before these frames of the same trial, or at its beginning."""
+    out = np.empty(len(frames))
+    for trial in np.unique(tracks.trial[frames]):
+        own, piece = tracks.trial[frames] == trial, slice(tracks.first[trial], tracks.first[trial + 1])
+        out[own] = np.interp(tracks.t_s[frames[own]] - by_s, tracks.t_s[piece], told[piece])
+    return out
 
 
 def _unwrapped(tracks: Tracks) -> Array:

@@ -26,7 +26,7 @@ from bns.physics.signals import CREEP_M_S
 
 SHIFT_S = DEFAULTS.residuals.command_shift_s
 WINDOW_S = DEFAULTS.residuals.command_window_s
-FARTHEST_S, SHIFTS = DEFAULTS.residuals.command_shifts
+FARTHEST_S, SHIFTS, HALVINGS = DEFAULTS.residuals.command_shifts
 FEWEST = DEFAULTS.residuals.command_fewest
 TIMES_USUAL = DEFAULTS.residuals.command_times_usual
 SMALLER, ALIKE = DEFAULTS.residuals.command_sizes_alike
@@ -35,7 +35,10 @@ WELL_KNOWN = DEFAULTS.residuals.command_well_known
 
 @dataclass(frozen=True)
 class CommandTimes:
-    """How early (-) or late (+) single ``commands`` are, relative to the others, s: standard deviation, 5 and 95 %."""
+    """How early (-) or late (+) single ``commands`` are, relative to the others, s: standard deviation, 5 and 95 %.
+
+    What errors of tracking add to the spread of what is measured is taken out.
+    """
 
     sd_s: float
     low_s: float
@@ -77,6 +80,7 @@ class CommandTimes:
 class _Change:
     """One change of command: its trial and number, the frames after it, and those later in the command (None: too few).
 
+    ``around``: the frames that a shift can reach, from the earliest on: without those before, any early time fits as well.
     ``kind``: on what a fault that is the same in every change may depend: 1, its size (m/s), the left wheel's share of it, how
     alike both wheels change (1: ahead, -1: on the spot), which wheels reverse, which stop and the inverse of their speed (s/m;
     friction ends a slow motion sooner), and how soon it follows the one before.
@@ -88,6 +92,7 @@ class _Change:
     kind: tuple[float, ...]
     after: slice
     later: slice | None
+    around: slice
 
 
 def command_times(problem: Problem, fit: Fit) -> CommandTimes | None:
@@ -100,15 +105,19 @@ def command_times(problem: Problem, fit: Fit) -> CommandTimes | None:
     changes = [change for change in _changes(tracks) if change.trial not in ignored]
     if len(changes) < FEWEST:
         return None
-    clear = _scattered(problem, fit, predictor, changes)
-    if clear is None:
+    scattered = _scattered(problem, fit, predictor, changes)
+    if scattered is None:
         return None
-    late_s = _delays(problem, fit, predictor, clear)
-    late_s = late_s - np.median(late_s)
-    low_s, high_s = (float(v) for v in np.quantile(late_s, [0.05, 0.95]))
-    seen = [(c.trial, c.command, c.after.start) for c in clear]
+    clear, noise = scattered
+    late_s, error_s = _delays(problem, fit, predictor, clear)
+    found = np.isfinite(late_s)
+    if found.sum() < FEWEST:
+        return None
+    late_s = late_s[found] - np.median(late_s[found])
+    sd_s, low_s, high_s = _spread(late_s, np.sqrt(noise) * error_s[found])
+    seen = [(c.trial, c.command, c.after.start) for c, good in zip(clear, found, strict=True) if good]
     rule = delay_rule(tracks, fit.model.wheelbase_m, Changes(*np.array(seen).T), late_s)
-    return CommandTimes(float(late_s.std()), low_s, high_s, len(clear), rule)
+    return CommandTimes(sd_s, low_s, high_s, len(late_s), rule)
 
 
 def _changes(tracks: Tracks) -> Iterator[_Change]:
@@ -129,7 +138,9 @@ def _changes(tracks: Tracks) -> Iterator[_Change]:
             later = slice(first + b, first + 2 * b - a) if inside else None
             since_s = begins - (ends[trial, which[number - 1]] if number else 0.0)
             speeds = np.stack([tracks.left_m_s[trial, k : k + 2], tracks.right_m_s[trial, k : k + 2]])
-            yield _Change(trial, int(k), number, _kind(speeds, float(since_s)), slice(first + a, first + b), later)
+            c = int(np.searchsorted(t_s, begins - min(FARTHEST_S, since_s)))
+            kind = _kind(speeds, float(since_s))
+            yield _Change(trial, int(k), number, kind, slice(first + a, first + b), later, slice(first + c, first + b))
 
 
 def _kind(speeds: Array, since_s: float) -> tuple[float, ...]:
@@ -145,8 +156,11 @@ def _kind(speeds: Array, since_s: float) -> tuple[float, ...]:
 
 def _scattered(
     problem: Problem, fit: Fit, predictor: WheelPredictor, changes: Sequence[_Change]
-) -> list[_Change] | None:
-    """The changes whose times are known best, where they scatter; None where they do not."""
+) -> tuple[list[_Change], float] | None:
+    """The changes whose times are known best, where they scatter, and the variance of what whitened innovations show without.
+
+    None where they do not scatter.
+    """
     root = np.sqrt(weights(fit.whitened))[:, None]
     left = fit.whitened * root
     shifted = [_later(problem, fit, predictor, changes, half, SHIFT_S) for half in (0, 1)]
@@ -169,7 +183,7 @@ def _scattered(
         return None
     if _of_large_steps(apart**2 - noise, known[clear], np.array([c.kind[1] for c in changes])[clear]):
         return None
-    return [c for c, good in zip(changes, clear, strict=True) if good]
+    return [c for c, good in zip(changes, clear, strict=True) if good], noise
 
 
 def _of_large_steps(excess: Array, known: Array, size: Array) -> bool:
@@ -187,32 +201,84 @@ def _of_large_steps(excess: Array, known: Array, size: Array) -> bool:
     return False
 
 
-def _delays(problem: Problem, fit: Fit, predictor: WheelPredictor, changes: Sequence[_Change]) -> Array:
-    """By how much each change is late, s: where, of many shifts, the loss of the poses after it is least; a parabola between."""
-    shifts = np.linspace(-FARTHEST_S, FARTHEST_S, SHIFTS)
-    loss = np.empty((len(changes), SHIFTS))
-    for j, shift_s in enumerate(shifts):
-        halves = [huber(_later(problem, fit, predictor, changes, half, float(shift_s))) for half in (0, 1)]
-        loss[:, j] = [float(halves[c.number % 2][c.after].sum()) for c in changes]
-    best = loss.argmin(axis=1).clip(1, SHIFTS - 2)
-    rows = np.arange(len(changes))
-    below, least, above = loss[rows, best - 1], loss[rows, best], loss[rows, best + 1]
-    bend = below - 2 * least + above
-    off = np.where(bend > 0.0, (below - above) / np.where(bend > 0.0, 2 * bend, 1.0), 0.0).clip(-1.0, 1.0)
-    out: Array = shifts[best] + off * (shifts[1] - shifts[0])
-    return out
+def _delays(problem: Problem, fit: Fit, predictor: WheelPredictor, changes: Sequence[_Change]) -> tuple[Array, Array]:
+    """By how much each change is late, and the standard error of that if noise is as the fit has it, s.
+
+    Where the loss of the poses around it is least, of many shifts, then between them; NaN where that is the last shift that was
+    tried or can be, or where the poses say nothing.
+    """
+    grid, each = np.linspace(-FARTHEST_S, FARTHEST_S, SHIFTS), np.arange(len(changes))
+    loss = np.stack([_losses(problem, fit, predictor, changes, np.full(len(changes), shift_s)) for shift_s in grid])
+    first = loss.argmin(axis=0)
+    beside = loss[np.stack([first - 1, first + 1]).clip(0, SHIFTS - 1), each]
+    inside = (first > 0) & (first < SHIFTS - 1) & np.isfinite(beside).all(axis=0)
+    best_s, least, step_s = grid[first], loss.min(axis=0), float(grid[1] - grid[0])
+    for _ in range(HALVINGS):
+        step_s /= 2
+        for tried_s in (best_s - step_s, best_s + step_s):
+            there = _losses(problem, fit, predictor, changes, tried_s)
+            best_s, least = np.where(there < least, tried_s, best_s), np.minimum(there, least)
+    off, known = _last_step(problem, fit, predictor, changes, best_s, step_s)
+    known[~inside | (known <= 0.0)] = np.nan
+    return best_s + (off / known).clip(-step_s, step_s), 1.0 / np.sqrt(known)
+
+
+def _last_step(
+    problem: Problem, fit: Fit, predictor: WheelPredictor, changes: Sequence[_Change], at_s: Array, step_s: float
+) -> tuple[Array, Array]:
+    """From shifts ``at_s`` (changes,), of a step of least squares: its right side (1/s), how well the shift is known (1/s2)."""
+    right, known = np.zeros(len(changes)), np.zeros(len(changes))
+    for half in (0, 1):
+        left, below, above = (_later(problem, fit, predictor, changes, half, at_s + by_s) for by_s in (0.0, -step_s, step_s))
+        answer, count = (above - below) / (2 * step_s), weights(left)[:, None]
+        for k, change in enumerate(changes):
+            if change.number % 2 == half:
+                one = answer[change.around] * count[change.around]
+                right[k], known[k] = -float((one * left[change.around]).sum()), float((one * answer[change.around]).sum())
+    return right, known
+
+
+def _spread(late_s: Array, error_s: Array) -> tuple[float, float, float]:
+    """Standard deviation, 5 and 95 % of delays (n,) that are known with these standard errors, without what errors add.
+
+    Each counts as much as it tells of the variance of the delays, and is drawn in by as much as errors make it stand out.
+    """
+    variance = float(late_s.var())
+    for _ in range(len(late_s)):
+        counts = 1.0 / np.maximum(variance + error_s**2, 1e-300)
+        mean = np.average(late_s, weights=counts)
+        was, variance = variance, max(float(np.average((late_s - mean) ** 2 - error_s**2, weights=counts)), 0.0)
+        if abs(variance - was) <= 1e-6 * was:
+            break
+    drawn_s = late_s * np.sqrt(variance * counts)
+    order = np.argsort(drawn_s)
+    share = (np.cumsum(counts[order]) - counts[order] / 2) / counts.sum()
+    low_s, high_s = (float(v) for v in np.interp([0.05, 0.95], share, drawn_s[order]))
+    return float(np.sqrt(variance)), low_s, high_s
+
+
+def _losses(problem: Problem, fit: Fit, predictor: WheelPredictor, changes: Sequence[_Change], shift_s: Array) -> Array:
+    """Of the poses around each change, where it is later by ``shift_s`` (changes,); infinite where it cannot be."""
+    halves = [huber(_later(problem, fit, predictor, changes, half, shift_s)) for half in (0, 1)]
+    loss = np.array([float(halves[c.number % 2][c.around].sum()) for c in changes])
+    return np.where([_can_be(predictor.tracks, c, s) for c, s in zip(changes, shift_s, strict=True)], loss, np.inf)
+
+
+def _can_be(tracks: Tracks, change: _Change, shift_s: float) -> bool:
+    """Do both commands last as long?"""
+    before_s, after_s = tracks.duration_s[change.trial, change.command : change.command + 2]
+    return bool(before_s + shift_s > 0.0 and after_s - shift_s > 0.0)
 
 
 def _later(
-    problem: Problem, fit: Fit, predictor: WheelPredictor, changes: Sequence[_Change], half: int, shift_s: float
+    problem: Problem, fit: Fit, predictor: WheelPredictor, changes: Sequence[_Change], half: int, shift_s: Array | float
 ) -> Array:
-    """Whitened innovations (frames, 3) where every other change of command is later by so much, or earlier; where it can be."""
+    """Whitened innovations (frames, 3) where every other change is later by so much (changes,), or earlier; where it can be."""
     tracks, duration_s = predictor.tracks, predictor.tracks.duration_s.copy()
-    for change in changes:
-        before, after = duration_s[change.trial, change.command : change.command + 2]
-        if change.number % 2 == half and before + shift_s > 0.0 and after - shift_s > 0.0:
-            duration_s[change.trial, change.command] += shift_s
-            duration_s[change.trial, change.command + 1] -= shift_s
+    for change, by_s in zip(changes, np.broadcast_to(shift_s, len(changes)), strict=True):
+        if change.number % 2 == half and _can_be(tracks, change, by_s):
+            duration_s[change.trial, change.command] += by_s
+            duration_s[change.trial, change.command + 1] -= by_s
     moved = predictor.driving(replace(tracks, duration_s=duration_s))
     whitened: Array = problem.pose_filter.whitened(moved.tracks, moved.steps(fit.model))
     return whitened

@@ -14,11 +14,11 @@ class CommandTimes:
     command_shift_s: float = setting(
         0.01, "s", f"How far each change of command is shifted, to see along which direction the poses answer; {BY_HAND}."
     )
-    command_shifts: tuple[float, int] = setting(
-        (0.2, 21),
-        "s, number",
+    command_shifts: tuple[float, int, int] = setting(
+        (0.2, 21, 3),
+        "s, number, number",
         "Where the times of commands scatter, each is shifted by up to the first number either way, in so many steps, to find "
-        f"when it took effect; {BY_HAND}.",
+        f"when it took effect; the steps around the best are then halved, as often as the last number says; {BY_HAND}.",
     )
     command_window_s: float = setting(
         0.6,

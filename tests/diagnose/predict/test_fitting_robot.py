@@ -42,6 +42,18 @@ def test_another_wheelbase_is_another_robot(factor):
         check_same_robot(predictor(NOMINAL), other)
 
 
+@pytest.mark.parametrize("effects", [{"motor_lag": {"tau_s": 0.5}}, {"command_delay": {"delay_s": 0.3}}, {}])
+def test_the_wheelbase_that_is_suggested_is_that_of_the_robot_however_late_it_turns(effects):
+    late = WheelPredictor(tracks_of(measured(hidden(**effects), trials=20, speeds=(-0.2, 0.2))))
+    assert suggested_wheelbase_m(late.tracks) == pytest.approx(NOMINAL.wheelbase_m, rel=0.03)
+
+
+def test_an_error_suggests_the_same_wheelbase():
+    late = predictor(hidden(motor_lag={"tau_s": 0.1}))
+    with pytest.raises(DataError, match=rf"would fit: --wheelbase {suggested_wheelbase_m(late.tracks):.4g} "):
+        check_same_robot(late, replace(NOMINAL, wheelbase_m=4 * NOMINAL.wheelbase_m))
+
+
 @pytest.mark.parametrize(("factor", "asked"), [(1.0, False), (1.1, False), (1.5, True), (1.81, True), (0.6, False)])
 def test_compare_asks_about_a_wheelbase_that_is_probably_wrong(factor, asked):
     other = replace(NOMINAL, wheelbase_m=factor * NOMINAL.wheelbase_m)

@@ -12,7 +12,7 @@ from bns.diagnose.diagnosing import diagnose
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.report.text import diagnosis_text
-from bns.diagnose.residuals.command_times import FEWEST, command_times
+from bns.diagnose.residuals.command_times import FEWEST, _spread, command_times
 from bns.physics.formula import formula_effect
 from tests.diagnose.worlds import FRAME_S, NOMINAL, hidden, measured
 
@@ -50,6 +50,14 @@ def late_where_large(tracks, beyond_m_s, late_s):
     return replace(tracks, duration_s=duration_s)
 
 
+def a_few_sooner(tracks, sooner_s):
+    """The tracks of a robot that carries out every seventh change of command sooner than the log says."""
+    duration_s = tracks.duration_s.copy()
+    for trial, k in np.argwhere(np.diff(tracks.left_m_s, axis=1) != 0)[::7]:
+        duration_s[trial, k : k + 2] += sooner_s, -sooner_s
+    return replace(tracks, duration_s=duration_s)
+
+
 def times_in(table, model=NOMINAL, as_logged=lambda tracks: tracks):
     predictor = WheelPredictor(as_logged(tracks_of(table)))
     problem = problem_for(predictor, model)
@@ -67,6 +75,35 @@ def test_the_scatter_is_that_of_the_delays(table):
     assert found.sd_s == pytest.approx(spread_s, rel=0.12)
     assert found.high_s - found.low_s == pytest.approx(LATEST * FRAME_S, rel=0.15)
     assert f"standard deviation {1e3 * found.sd_s:.0f} ms" in found.in_words
+
+
+@pytest.mark.parametrize("sooner_s", [0.05, 0.11, -0.08])
+def test_a_few_that_are_sooner_are_so_by_as_much(sooner_s):
+    """Poses from before a command is logged say how much sooner it acted: without them, any early time fits."""
+    exact = measured(NOMINAL, trials=30, seed=3, speeds=(-0.2, 0.2), commands=8, noise=(0.0005, 0.002), jitter=0.0)
+    found = times_in(exact, as_logged=partial(a_few_sooner, sooner_s=sooner_s))
+    assert (-found.low_s if sooner_s > 0 else found.high_s) == pytest.approx(abs(sooner_s), rel=0.1)
+    assert found.high_s - found.low_s == pytest.approx(abs(sooner_s), rel=0.1)
+    assert found.sd_s == pytest.approx(abs(sooner_s) * np.sqrt(6) / 7, rel=0.1)
+
+
+def test_times_at_the_end_of_what_is_tried_do_not_count(monkeypatch, table):
+    """Two of five are farther off."""
+    monkeypatch.setattr("bns.diagnose.residuals.command_times.FARTHEST_S", 0.06)
+    found = times_in(late(table), hidden(command_delay={"delay_s": LATEST * FRAME_S / 2}))
+    assert -0.05 < found.low_s < found.high_s < 0.05
+    monkeypatch.undo()
+    every = times_in(late(table), hidden(command_delay={"delay_s": LATEST * FRAME_S / 2}))
+    assert found.commands == pytest.approx(every.commands * 3 / 5, rel=0.15)
+
+
+def test_what_errors_of_tracking_add_is_taken_out():
+    rng = np.random.default_rng(0)
+    true_s, error_s = rng.uniform(-0.05, 0.05, 2000), np.repeat([0.002, 0.04], 1000)
+    sd_s, low_s, high_s = _spread(true_s + error_s * rng.normal(size=2000), error_s)
+    assert sd_s == pytest.approx(true_s.std(), rel=0.05)
+    assert (low_s, high_s) == pytest.approx(np.quantile(true_s, [0.05, 0.95]), rel=0.1)
+    assert _spread(error_s[:1000] * rng.normal(size=1000), 2 * error_s[:1000]) == (0.0, 0.0, 0.0)
 
 
 def test_stops_of_a_robot_with_friction_are_no_scatter(monkeypatch):
