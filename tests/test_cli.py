@@ -256,3 +256,18 @@ def test_a_warning_is_printed_once_a_command(tmp_path, sweep_file, capsys):
         said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("bns: warning: ")]
         assert said
         assert len(said) == len(set(said))
+
+
+@pytest.mark.parametrize("given", [["nowhere"], ["--results", "nowhere"]])
+def test_archive_takes_its_folder_either_way(given, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["archive", *given, "-o", "x.parquet"]) == 2
+    assert "no results in nowhere" in capsys.readouterr().err
+
+
+def test_a_dry_run_that_compiles_says_so_off_a_terminal(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("bns.engine.jit.compiled", lambda *_: False)
+    sweep = tmp_path / "s.yaml"
+    sweep.write_text("name: s\nrobot: khepera\nseeds: 1\nfixed: {evaluations: 2}\n")
+    main(["sweep", str(sweep), "--dry-run", "--results", str(tmp_path / "r")])
+    assert capsys.readouterr().err.count("compiling the kernels") == 1

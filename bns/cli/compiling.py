@@ -7,9 +7,9 @@ import sys
 from bns.spec import RunSpec
 
 
-def say_if_compiling(*specs: RunSpec) -> None:
-    """One line on stderr, where that is a terminal and kernels of these specs are not compiled yet."""
+def say_if_compiling(*specs: RunSpec, always: bool = False) -> None:
+    """One line on stderr, where that is a terminal (or ``always``) and kernels of these specs are not compiled yet."""
     from bns.engine.jit import compiled
 
-    if sys.stderr.isatty() and not all(compiled(spec.robot, spec.world) for spec in specs):
+    if (always or sys.stderr.isatty()) and not all(compiled(spec.robot, spec.world) for spec in specs):
         print("bns: compiling the kernels, once on this machine (about 20 s)", file=sys.stderr)

@@ -22,7 +22,8 @@ def add_commands(command: Adder) -> None:
         one.add_argument("--json", action="store_true", help="print a list of JSON objects, one per row")
     small = command("compact", compact, "merge small result files, recover journals, upgrade older files")
     keep = command("archive", archive, "write the data that figures and findings need into one small file")
-    keep.add_argument("results", type=Path, nargs="?", default=Path("results"), metavar="DIR", help="folder of all results")
+    add_results(keep)
+    keep.add_argument("folder", type=Path, nargs="?", metavar="DIR", help="the same, without --results")
     keep.add_argument("-o", "--output", type=Path, required=True, metavar="FILE.parquet", help="file to write")
     keep.add_argument("--sweep", action="append", metavar="NAME", help="keep this sweep (may be repeated; default: all)")
     drawn = command("figures", figures, "draw all figures that the results allow, on one page: DIR/figures/index.html")
@@ -86,7 +87,7 @@ def archive(options: argparse.Namespace) -> int:
     """One file of what figures need."""
     from bns.store.archive.write import archive as write
 
-    print(write(options.results, options.output, options.sweep))
+    print(write(options.folder or options.results, options.output, options.sweep))
     return 0
 
 

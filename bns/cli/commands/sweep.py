@@ -86,6 +86,8 @@ def sweep(options: argparse.Namespace) -> int:
     backend = load_executor(backend_name(options))
     with SweepProgress() as bar:
         request = request_of(options, bar)
+        if options.device == "cpu":
+            say_if_compiling(*(RunSpec(robot=file.robot, **file.combos[0]) for file in files), always=options.dry_run)
         if options.dry_run:
             place = backend.placement(request)
             for one in sweeps:
@@ -94,8 +96,6 @@ def sweep(options: argparse.Namespace) -> int:
                 )
                 print(planned(estimate, place))
             return 0
-        if options.device == "cpu":
-            say_if_compiling(*(RunSpec(robot=file.robot, **file.combos[0]) for file in files))
         failed = 0
         for one in sweeps:
             if options.until:
