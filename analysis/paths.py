@@ -6,7 +6,7 @@ import pandas as pd
 
 from analysis.coverage import coverage
 from analysis.figure_result import FigureResult
-from analysis.labels import counted, task_title
+from analysis.labels import CELL, TITLES, counted, task_title, valued
 from analysis.repeats import mean_path, paths_of, repeats_of
 from analysis.results import NoDataError, Results
 from bns.plotting.style import draw_paths, frame_alike, goal_reach, note, outcome, panels, style
@@ -30,7 +30,7 @@ def last_successes(store: Results) -> pd.DataFrame:
     return store.query(f"""
         WITH with_paths AS (SELECT run_id, coalesce(min(sweep) FILTER (sweep = '{FIRST}'), min(sweep)) AS sweep
                             FROM paths GROUP BY run_id)
-        SELECT robot, task, sweep, seed, run_id,
+        SELECT robot, task, sweep, seed, run_id, {", ".join(CELL)},
                coalesce(max(evaluation) FILTER (success), max(evaluation)) AS evaluation, bool_or(success) AS success,
                coalesce(arg_max(fittest_commands, evaluation) FILTER (success), arg_max(fittest_commands, evaluation)) AS commands
         FROM evals SEMI JOIN with_paths USING (run_id, sweep)
@@ -64,6 +64,7 @@ def _draw_task(store: Results, robot: str, task: str, runs: pd.DataFrame) -> Fig
     radius_m, square = goal_reach(load_robot(robot), load_task(robot, task))
     figure, axes = panels(len(shown), 3.5)
     numbers = list(walked.values())
+    differ = [name for name in CELL if shown[name].nunique() > 1]
     for run, ax in zip(shown.itertuples(), axes[:, 0], strict=True):
         path = walked[run.run_id]
         repeats = repeats_of(store.results, str(run.sweep), str(run.run_id), int(run.evaluation))
@@ -73,6 +74,7 @@ def _draw_task(store: Results, robot: str, task: str, runs: pd.DataFrame) -> Fig
         if drives:
             numbers.append(repeats.assign(run_id=run.run_id)[["run_id", "repeat", "step", *WORLD]])
         origin = f"{run.sweep},\n" if len(sweeps) > 1 else ""
+        origin += "".join(f"{TITLES[name]} {valued(name, getattr(run, name))},\n" for name in differ)
         driven = len(path) - 1
         cut = f",\nended in cycle {driven} of {int(run.commands)}" if driven < run.commands else ""
         reached = repeats.groupby("repeat").success.first().sum()

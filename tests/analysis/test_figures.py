@@ -382,3 +382,9 @@ def test_a_band_of_pooled_runs_knows_that_they_share_the_luck_of_their_seeds():
 def test_markers_of_a_legend_are_large_enough_however_many_dots_there_are(study):
     (drawn, *_) = success_by_diversity.draw(Results(study))
     assert {handle.get_markersize() for handle in drawn.figure.legends[0].legend_handles} == {LEGEND_PT}
+
+
+def test_paths_say_of_which_combination_each_is_where_these_differ(tmp_path):
+    written(tmp_path, "one", [record(spec, ("evals", "paths")) for spec in specs(1)])
+    titles = [axis.get_title() for axis in paths.draw(Results(tmp_path))[0].figure.axes]
+    assert [title.partition(",")[0] for title in titles if title] == ["mutation rate 10 %", "mutation rate 50 %"]
