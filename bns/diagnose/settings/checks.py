@@ -139,6 +139,12 @@ class Checks:
         "Poses of a trial whose middle nine tenths spread by more, in position or heading, are of a robot that moves. The noise "
         f"of a tracker and the drift of a robot at rest stay below; {BY_HAND}.",
     )
+    far_m: float = setting(
+        1000.0,
+        "m",
+        "Positions that lie further from the origin, and further than the robot drives, are refused: places of effects are "
+        "plausible up to here (`floor-patch`), or bounded (`lens-distortion`). A tracker's own origin is in its room.",
+    )
     same_heading_rad: float = setting(
         1e-6,
         "rad",
