@@ -10,6 +10,7 @@ from scipy.special import stdtr
 
 from bns.diagnose.data.stamps import stamp_scatter
 from bns.diagnose.data.tracks import Array, Tracks
+from bns.diagnose.estimate.fit import without_width
 from bns.diagnose.estimate.plausibility import known_together
 from bns.diagnose.estimate.smoothing_tracker import LATE, smoothing_tracker
 from bns.diagnose.outcome import Outcome
@@ -21,7 +22,7 @@ from bns.diagnose.select.negligible import Shift
 from bns.diagnose.select.result import SelectionResult
 from bns.diagnose.select.variants import order_of_friction, uncertain_variants
 from bns.diagnose.settings import DEFAULTS
-from bns.diagnose.values import numbers_of, tied_sets, without_width
+from bns.diagnose.values import numbers_of, tied_sets
 from bns.physics.effect import Effect, Parameter
 from bns.physics.figures import with_unit
 from bns.physics.jointed.mechanism import machine

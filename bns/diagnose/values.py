@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -13,10 +12,7 @@ from bns.diagnose.predict.paired_errors import PairedErrors, plain
 from bns.diagnose.residuals.along_variables import ResidualDependence
 from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.select.result import Candidate, SelectionResult
-from bns.diagnose.settings import DEFAULTS
 from bns.physics.model import ActiveEffect
-
-_NO_WIDTH = DEFAULTS.report.no_width
 
 
 def before_and_after(errors: PairedErrors) -> dict[str, dict[str, float | int | None]]:
@@ -74,11 +70,6 @@ def _spread(per_trial_effect: ActiveEffect) -> dict[str, dict[str, Any]]:
     between = {"value": scatter, "se": loose, "low": max(scatter - 1.96 * loose, 0.0), "high": scatter + 1.96 * loose}
     always = {"unit": p.unit, "at_bound": False}
     return {p.name: {**mean, **always, "per_trial": True}, f"between_trials_{p.unit}": {**between, **always}}
-
-
-def without_width(low: float, high: float) -> bool:
-    """Does an interval say nothing? Its number is at a bound, or no small change of it changes the loss."""
-    return math.isclose(low, high, rel_tol=_NO_WIDTH)
 
 
 def ties_of(selection: SelectionResult) -> list[list[str]]:

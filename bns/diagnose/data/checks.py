@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from bns.diagnose.data.apply_mapping import repeated
+from bns.diagnose.data.far_origin import refuse_far_origin
 from bns.diagnose.data.odd_commands import half_told, never_told, refuse_untold, untold_trials
 from bns.diagnose.data.reckoned import reckoned
 from bns.diagnose.data.still_heading import refuse_still_coordinate, refuse_still_heading
@@ -72,6 +73,7 @@ def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     refuse_still_heading(usable, trials)
     refuse_still_coordinate(usable, trials)
     note = check_units(usable, trials)
+    refuse_far_origin(usable)  # of positions in mm and cm the unit is said first
     unit: tuple[int, str] | None = (int(usable.index[0]), note) if note else None
     oddities = (unit, odd, untold_trials(usable, trials), never_told(usable), _nameless(table), reckoned(usable, trials))
     names = table["trial"].astype(object).where(table["trial"].notna(), "")

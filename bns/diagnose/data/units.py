@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
+from bns.diagnose.data.degrees import look_like_degrees
 from bns.diagnose.data.mapping import SIZES
 from bns.diagnose.data.merge_topics import without_commands
 from bns.diagnose.data.speed_units import Ways, mistake_of, speed_note
@@ -45,7 +46,7 @@ def check_units(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -
         unit = next(unit for least, unit in _FINER if step > least)
         raise DataError(_apart(step, unit))
     _check_length(table)
-    ways, driven, moved = _driven(table, trials)
+    ways, driven, moved, ends = _driven(table, trials)
     speed = float(np.nanmax(np.abs(table[list(COMMANDS)].to_numpy())))
     ratio = _ratio(ways[:, 0], ways[:, 1]) if len(ways) else float("nan")
     untold = without_commands(table)
@@ -56,7 +57,9 @@ def check_units(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -
             "each until the next."
         )
     _refuse_short_steps(step, ratio)
-    refuse_unlike_axes(driven.forward_m, *moved)  # before any advice that takes the way for one length
+    in_degrees = look_like_degrees(table, np.column_stack([ways[:, 0], driven.forward_m, ways[:, 2]]), moved[1], ends)
+    if not in_degrees:  # before any advice that takes the way for one length
+        refuse_unlike_axes(driven.forward_m, *moved)
     _refuse_unlike_wheels(ways, driven, *moved)
     if step >= 1.0 and 1 / 3000 < ratio < 1 / 300:
         raise DataError(_apart(step, "milliseconds"))
@@ -93,19 +96,24 @@ def check_units(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -
             "they must be metres per second. In a mapping of `bns import`, give "
             f"{cure}.{_by_turns(ways, driven)}"
         )
-    if _turns_as_degrees(table):
+    if in_degrees or _turns_as_degrees(table):
         raise DataError(
-            "Headings change far more than the wheels can turn the robot: heading_rad looks like degrees; "
+            "Headings change far more than wheels can turn the robot, or than its path does: heading_rad looks like degrees; "
             f"it must be radians. {_cure('heading_rad', 'deg')}"
         )
+    _refuse_opposite_turns(ways, driven, *moved)
+    return speed_note(driven)
+
+
+def _refuse_opposite_turns(ways: np.ndarray, driven: Ways, halfway_rad: np.ndarray, moved_m: np.ndarray) -> None:
+    """DataError if the robot turns to one side where its wheels are told to turn it to the other."""
     if len(ways) and np.abs(ways[:, 2]).sum() > 0.3:
         told, seen = ways[
             np.abs(ways[:, 2]) <= np.median(np.abs(ways[ways[:, 2] != 0, 2])), 2:
         ].T  # larger ones may be rounds
         same = float(told @ seen / np.sqrt((told @ told) * (seen @ seen) + 1e-300))
         if same < -0.5:
-            raise DataError(opposite_turns(driven.forward_m, *moved))
-    return speed_note(driven)
+            raise DataError(opposite_turns(driven.forward_m, halfway_rad, moved_m))
 
 
 def _by_turns(ways: np.ndarray, driven: Ways) -> str:
@@ -225,14 +233,14 @@ def _correlation(one: np.ndarray, other: np.ndarray) -> float:
 
 def _driven(
     table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]
-) -> tuple[np.ndarray, Ways, tuple[np.ndarray, np.ndarray]]:
+) -> tuple[np.ndarray, Ways, tuple[np.ndarray, np.ndarray], np.ndarray]:
     """For windows of about a second (windows, 4): way and turn commanded (base of 1 m), way and turn seen; the same as ways; and
-    the heading halfway with the motion along x and y (windows, 2).
+    the heading halfway with the motion along x and y (windows, 2); and the headings at both ends, as logged (windows, 2).
 
     A trial that is shorter than that, such as a single motion of a sensor, is a window.
     """
     times, commands, poses = table["t_s"].to_numpy(), table[list(COMMANDS)].to_numpy(), table[list(POSE)].to_numpy()
-    found = [np.zeros((0, 9))]
+    found = [np.zeros((0, 11))]
     for number, (_, at) in enumerate(trials):
         t, pose = times[at], poses[at]
         left, right = np.nan_to_num(commands[at]).T
@@ -251,7 +259,9 @@ def _driven(
         moved = pose[b, :2] - pose[a, :2]
         went = np.hypot(*moved.T)
         told = [way[b] - way[a], went, turn[b] - turn[a], heading[b] - heading[a], forward[b] - forward[a]]
-        found.append(np.column_stack([*told, np.full(len(a), number), (heading[a] + heading[b]) / 2, moved]))
+        seen_there = [(heading[a] + heading[b]) / 2, moved, pose[a, 2], pose[b, 2]]
+        found.append(np.column_stack([*told, np.full(len(a), number), *seen_there]))
     windows = np.concatenate(found)
     way, went, _, turned, forward, trial, halfway, *_ = windows.T
-    return windows[:, :4], Ways(forward, way, went, turned, trial.astype(np.int64)), (halfway, windows[:, 7:])
+    ways = Ways(forward, way, went, turned, trial.astype(np.int64))
+    return windows[:, :4], ways, (halfway, windows[:, 7:9]), windows[:, 9:]

@@ -136,9 +136,7 @@ def best_start(problem: Problem, base: Fit, effect: Effect, known: Model | None 
     such as a lag for the ticks of a clock, has to give way first. Where a formula does nothing at some starts (a limit that
     nothing reaches), more are tried on the way to them: no slope leads away from there.
     """
-    lows, highs = ([getattr(p, end) for p in effect.parameters] for end in ("low", "high"))
-    found = (tuple(np.clip(values, lows, highs).tolist()) for values in _starts(effect, problem.predictor, base.model))
-    starts = [base.model.with_active(effect, values) for values in found]
+    starts = [base.model.with_active(effect, values) for values in _starts(effect, problem.predictor, base.model)]
     if known is not None and effect.name in {active.effect.name for active in known.effects}:
         starts.append(base.model.with_active(effect, tuple(known.values_of(effect.name).values())))
     losses = _losses(problem, starts)
@@ -191,6 +189,14 @@ def _stepped(problem: Problem, base: Fit, start: Model, loss: float) -> Starting
 
 
 def _starts(effect: Effect, predictor: Predictor, model: Model) -> Iterator[tuple[float, ...]]:
+    """Within the bounds of the numbers, whatever the effect makes of the poses; its neutral values where nothing is left."""
+    lows, highs = ([getattr(p, end) for p in effect.parameters] for end in ("low", "high"))
+    found = [values for values in _proposed(effect, predictor, model) if not np.isnan(values).any()]
+    for values in found or [tuple(effect.neutral.values())]:
+        yield tuple(np.clip(values, lows, highs).tolist())
+
+
+def _proposed(effect: Effect, predictor: Predictor, model: Model) -> Iterator[tuple[float, ...]]:
     if effect.starts_from is not None and isinstance(predictor, WheelPredictor):
         yield from predictor.starts_of(effect, model)
         return

@@ -10,14 +10,14 @@ import numpy as np
 
 from bns.diagnose.design.competing_models import without_last
 from bns.diagnose.diagnosis import Diagnosis
-from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fit import Fit, without_width
 from bns.diagnose.report.people import unit_for_people
 from bns.diagnose.report.sized import sized_sentence
 from bns.diagnose.residuals.drive_scatter import far_above_noise
 from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.result import SelectionResult
 from bns.diagnose.settings import DEFAULTS
-from bns.diagnose.values import numbers_of, without_width
+from bns.diagnose.values import numbers_of
 
 _CAUSES = DEFAULTS.report.causes
 _LISTED = DEFAULTS.report.listed_causes

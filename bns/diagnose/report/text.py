@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
@@ -15,16 +16,17 @@ from bns.diagnose.design.competing_models import Rival
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.effect_caveats import implausible_text
 from bns.diagnose.estimate.calibration import wheel_sizes
+from bns.diagnose.estimate.fit import without_width
 from bns.diagnose.predict.paired_errors import Change, PairedErrors
 from bns.diagnose.report.plain_language import ABOVE_NOISE, further_notes, nothing_above_noise
 from bns.diagnose.report.sized import sized_sentence
 from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.settings import DEFAULTS
-from bns.diagnose.values import numbers_of, numbers_of_term, ties_of, without_width
+from bns.diagnose.values import numbers_of, numbers_of_term, ties_of
 from bns.physics.decoys import DECOYS
 from bns.physics.effect import Effect
-from bns.physics.figures import figures_apart, with_unit
+from bns.physics.figures import with_unit
 
 _VERDICTS = {
     "none": "Nothing is missing that these measurements could show.",
@@ -196,21 +198,23 @@ def _with_interval(effect: str, name: str, n: Mapping[str, Any]) -> str:
 
 
 def _number(name: str, n: Mapping[str, Any]) -> str:
-    said = f"{name} = {n['value']:.5g}{with_unit(n['unit'])}"
+    digits = _digits(n["value"], n["low"], n["high"])
+    said = f"{name} = {n['value']:.{digits}g}{with_unit(n['unit'])}"
     if without_width(n["low"], n["high"]):
         loose = "one trial only, or no small change changes the loss"
         why = "it is at the bound of what it can be" if n.get("at_bound") else loose
         return f"{said} (no interval: {why})"
     mean = ", perhaps only the mean of delays that differ: see the notes" if n.get("of_mean") else ""
     beside = ", together with the free term only: see the notes" if n.get("cancels") else mean
-    low, high = _ends(n["low"], n["high"])
-    return f"{said} (95 %: {low} to {high}{beside})"
+    return f"{said} (95 %: {n['low']:.{digits}g} to {n['high']:.{digits}g}{beside})"
 
 
-def _ends(low: float, high: float) -> tuple[str, str]:
-    """The ends of an interval, in enough figures that they differ."""
-    count = figures_apart(low, high, 5)
-    return f"{low:.{count}g}", f"{high:.{count}g}"
+def _digits(value: float, low: float, high: float) -> int:
+    """Five, or as many as show how far the ends of an interval are apart: of a place far from the origin more."""
+    if without_width(low, high) or not math.isfinite(high - low):
+        return 5
+    times = max(abs(value), abs(low), abs(high)) / abs(high - low)
+    return max(5, math.ceil(math.log10(times)) + 1)
 
 
 def _errors(errors: PairedErrors | None) -> Iterator[str]:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bns.diagnose.estimate.cross_validation import held_out_steps
-from bns.diagnose.estimate.fit import Fit
+from bns.diagnose.estimate.fit import Fit, without_width
 from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.lacking import fit_without
 from bns.diagnose.estimate.parameters import FreeParameter
@@ -36,7 +36,6 @@ LUCK = DEFAULTS.select.least_fall_luck
 MEDIAN_OF = DEFAULTS.select.least_fall_windows
 LEAST_SHIFT = DEFAULTS.select.least_shift
 SLIGHT = DEFAULTS.residuals.slight_excess
-_NO_WIDTH = DEFAULTS.report.no_width
 _ALL = "all"
 
 
@@ -184,7 +183,7 @@ def _size(number: FreeParameter, value: float) -> float:
 def _within(value: float, interval: tuple[float, float]) -> bool:
     """So it is said to be where the interval has no width, and says nothing."""
     low, high = interval
-    return math.isclose(low, high, rel_tol=_NO_WIDTH) or low <= value <= high
+    return without_width(low, high) or low <= value <= high
 
 
 def _without_each(selection: SelectionResult, dropped: Sequence[str], kept: Sequence[str]) -> dict[str, Fit]:

@@ -139,6 +139,12 @@ class Checks:
         "Poses of a trial whose middle nine tenths spread by more, in position or heading, are of a robot that moves. The noise "
         f"of a tracker and the drift of a robot at rest stay below; {BY_HAND}.",
     )
+    far_m: float = setting(
+        1000.0,
+        "m",
+        "Positions that lie further from the origin, and further than the robot drives, are refused: places of effects are "
+        "plausible up to here (`floor-patch`), or bounded (`lens-distortion`). A tracker's own origin is in its room.",
+    )
     same_heading_rad: float = setting(
         1e-6,
         "rad",
@@ -163,6 +169,26 @@ class Checks:
     )
     degrees_beyond: float = setting(
         60.0, "rad", f"If no heading of a log is larger, they are radians: in degrees, a robot leaves this quickly; {BY_HAND}."
+    )
+    degrees_directions: tuple[float, float] = setting(
+        (0.8, 0.6),
+        "1",
+        "Headings are degrees where directions of travel agree with them, read so, by at least the first number, and read as "
+        f"radians by at most the second one (as `guess_headings`); {BY_HAND}.",
+    )
+    degrees_left: float = setting(
+        0.5,
+        "1",
+        "They are, if read so they also leave at most this part of what directions differ by on their own (or by "
+        "`degrees_rates_rad_m`): a robot that drives in one direction agrees with any heading that hardly changes; "
+        f"{BY_HAND}.",
+    )
+    degrees_rates_rad_m: tuple[float, float] = setting(
+        (15.0, 30.0),
+        "rad/m",
+        "More radians per metre of wheel difference than the first number tell degrees where directions disagree with radians; "
+        "more than the second one, with headings beyond `degrees_beyond`, where no direction is known. Robots with a wheelbase "
+        "from 0.05 m turn by at most 20, and in degrees one of 1.5 m by 38.",
     )
     speed_unit_band: float = setting(
         1.05,

@@ -41,7 +41,10 @@ class Report:
         45, "characters", "Names that are longer together would touch each other along the axis of a figure: they are turned."
     )
     no_width: float = setting(
-        1e-5, "1", f"An interval whose ends differ by less than this share says nothing and is not shown; {BY_HAND}."
+        1e-5,
+        "1",
+        "An interval whose ends differ by less than this share, or by less than this in SI units where they are above 1, says "
+        f"nothing and is not shown; {BY_HAND}.",
     )
     same_share: float = setting(
         0.005,

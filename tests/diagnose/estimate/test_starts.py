@@ -1,10 +1,12 @@
 """Where the fit with one effect more begins, and when it is not made."""
 
+from dataclasses import replace
+
 import pytest
 
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.estimate.problem import settled_problem
-from bns.diagnose.estimate.starts import best_start, fit_with, listed
+from bns.diagnose.estimate.starts import _starts, best_start, fit_with, listed
 from bns.diagnose.predict.wheels import WheelPredictor
 from tests.diagnose.worlds import NOMINAL, hidden, measured
 
@@ -40,3 +42,21 @@ def test_an_effect_that_promises_nothing_is_not_fitted():
     assert min(start.loss, start.promised) > base.loss - 1
     added = fit_with(problem, base, effects["motor-lag"])
     assert added.model == start.model
+
+
+def test_starts_that_an_effect_proposes_are_held_within_its_bounds():
+    """As those of a patch of floor on a map are; what is no number is dropped."""
+    problem, base, effects = fitted(NOMINAL, hidden(wheelbase={"factor": 1.0}), trials=4)
+    patch = effects["uneven-patch"]
+    given = problem.predictor
+    neutral = tuple(patch.neutral.values())
+    low, high = ([getattr(p, end) for p in patch.parameters] for end in ("low", "high"))
+    for proposed, used in (
+        ((tuple(2 * v + 1 for v in high), tuple(2 * v - 1 for v in low)), [tuple(high), tuple(low)]),
+        (((float("nan"), *neutral[1:]), neutral), [neutral]),
+        (((float("nan"), *neutral[1:]),), [neutral]),
+    ):
+        told = replace(patch, name=f"told-{len(proposed)}-{proposed[0][0]}", starts_from=lambda _, starts=proposed: starts)
+        assert list(_starts(told, given, base.model)) == used
+        for values in _starts(told, given, base.model):
+            base.model.with_active(told, values)

@@ -244,6 +244,9 @@ def test_a_number_without_an_interval_says_why():
     said = _with_interval("force-limit", "turn_ratio", number | {"at_bound": True})
     assert said.endswith("= 50 (no interval: it is at the bound of what it can be)")
     assert _with_interval("motor-lag", "tau_s", number | {"low": 40.0, "unit": "s"}).endswith("= 50 s (95 %: 40 to 50)")
+    place = {"value": 901.000771, "low": 900.998018, "high": 901.004884, "unit": "m"}  # 7 mm, a share of 8e-6
+    assert _with_interval("floor-patch", "x_m", place).endswith("x_m = 901.0008 m (95 %: 900.998 to 901.0049)")
+    assert _with_interval("force-limit", "turn_ratio", number | {"low": 49.999999}).endswith("no small change changes the loss)")
 
 
 @pytest.mark.parametrize(

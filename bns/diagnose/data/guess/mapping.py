@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import yaml
 
+from bns.diagnose.data.far_origin import PLACE, offsets_towards_origin
 from bns.diagnose.data.guess.clocks import Clocks, clocks
 from bns.diagnose.data.guess.columns import METRES_A_COUNT, RADIUS, motions_of, of_columns, rank_of_commands
 from bns.diagnose.data.guess.numbers import (
@@ -17,6 +19,7 @@ from bns.diagnose.data.guess.numbers import (
     LENGTHS,
     SCALE,
     cut_into_trials,
+    in_si,
     metres_a_unit,
     spread_of_positions,
 )
@@ -147,7 +150,16 @@ def _everything(mapping: Mapping[str, Any]) -> Entries:
 
 
 def _entries(table: pd.DataFrame) -> Entries:
-    return of_topic_columns(table) if of_topics(table) else of_columns(table)
+    return _with_offsets(table, of_topic_columns(table) if of_topics(table) else of_columns(table))
+
+
+def _with_offsets(table: pd.DataFrame, entries: Entries) -> Entries:
+    """The entries, those of positions far from the origin with offsets that bring them near it."""
+    if any(not isinstance(entries.get(name, {}).get("from"), str) for name in PLACE):
+        return entries
+    places = np.column_stack([in_si(table, entries[name], with_unit=True) for name in PLACE])
+    moved = {name: {**entries[name], "offset": by} for name, by in zip(PLACE, offsets_towards_origin(places), strict=True) if by}
+    return {**entries, **moved}
 
 
 def _commands_in(found: Mapping[str, Entries]) -> tuple[str, ...]:
@@ -218,6 +230,11 @@ def _remarks(entries: Entries, tables: Mapping[str, pd.DataFrame]) -> Iterator[s
         far = [spread for table in tables.values() if (spread := spread_of_positions(table, entries)) is not None]
         if far and max(far) > LARGEST_M:
             yield f"The positions spread over {max(far):.0f}: unless these are metres, give x_m and y_m their unit (mm, cm)."
+    if any("offset" in entries.get(name, {}) for name in PLACE):
+        yield (
+            "The positions lie far from the origin, as on a map; the offsets move it to where the robot drives. They hold for "
+            "all trials. Give other logs of the same site the same offsets, or places cannot be compared."
+        )
     told = _names_of(entries, (*COMMANDS, FORWARD, TURN))
     if told and rank_of_commands(entries) < 0:
         yield "The speeds are measured, not commanded: effects of motors and controller (lag, limits) cannot show."
