@@ -13,7 +13,7 @@ from bns.diagnose.estimate.parameters import FreeParameter
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.model import Model
 
-_NO_WIDTH = DEFAULTS.report.no_width
+_NO_WIDTH, _FINEST = DEFAULTS.report.no_width
 
 
 @dataclass(frozen=True)
@@ -82,6 +82,8 @@ class StartingPoint:
 def without_width(low: float, high: float) -> bool:
     """Does an interval say nothing? Its number is at a bound, or no small change of it changes the loss.
 
-    By share; of numbers above 1 by the difference: a place that lies 900 m from the origin may be known to millimetres.
+    By share; of numbers above 1 by the difference and a finer share: a place that lies 900 m from the origin may be known to
+    millimetres.
     """
-    return low == high or abs(high - low) <= _NO_WIDTH * min(max(abs(low), abs(high)), 1.0)
+    size, width = max(abs(low), abs(high)), abs(high - low)
+    return low == high or width <= max(_NO_WIDTH * min(size, 1.0), _FINEST * size)

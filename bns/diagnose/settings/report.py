@@ -40,11 +40,11 @@ class Report:
     tick_characters: int = setting(
         45, "characters", "Names that are longer together would touch each other along the axis of a figure: they are turned."
     )
-    no_width: float = setting(
-        1e-5,
+    no_width: tuple[float, float] = setting(
+        (1e-5, 1e-7),
         "1",
-        "An interval whose ends differ by less than this share, or by less than this in SI units where they are above 1, says "
-        f"nothing and is not shown; {BY_HAND}.",
+        "An interval whose ends differ by less than the first share, or, where they are above 1 in SI units, by less than that "
+        f"number or the second share, says nothing and is not shown; {BY_HAND}.",
     )
     same_share: float = setting(
         0.005,
