@@ -51,6 +51,7 @@ WORDS: Mapping[str, str] = {
     **{"radians per second": "rad/s", "degrees per second": "deg/s", "dps": "deg/s"},
 }
 """What units are called elsewhere -> the unit."""
+_TURNS_A_MINUTE = {"rpm", "rev/min", "1/min", "r/min", "turns/min"}
 SIZES = {unit: size for unit, (_, size) in UNITS.items()}
 """Unit -> its size in SI units."""
 FORWARD, TURN = "forward_m_s", "turn_rad_s"
@@ -213,6 +214,9 @@ def _check_unit(name: str, entry: Mapping[str, Any]) -> None:
     unit = entry.get("unit")
     if unit is None:
         return
+    if isinstance(unit, str) and unit.lower() in _TURNS_A_MINUTE and _SI.get(name) in {"m/s", "rad/s"}:
+        scale = "the wheel's radius in metres times 0.10472" if _SI[name] == "m/s" else "0.10472 (rad/s for one of them)"
+        raise DataError(f"{name}: {unit} is no unit here; turns per minute have a scale instead, {scale}.")
     if not isinstance(unit, str) or unit not in UNITS:
         raise DataError(f"{name}: " + unknown_name("unit", unit, UNITS, WORDS))
     wanted = "m" if entry.get("counts") and _SI.get(name) == "m/s" else _SI.get(name)

@@ -47,6 +47,29 @@ def test_positions_that_spread_too_far_for_metres_are_pointed_at(factor, said):
     assert any("unless these are metres" in remark for remark in remarks) is said
 
 
+def test_names_of_a_field_robot_are_known():
+    table = measured(NOMINAL, trials=4)
+    log = pd.DataFrame({"mission": table.trial, "gps_time": table.t_s, "left_kmh": 3.6 * table.left_m_s})
+    log = log.assign(right_kmh=3.6 * table.right_m_s, easting=table.x_m + 455_000.0, northing=table.y_m + 5_812_000.0)
+    log = log.assign(course=np.degrees(np.pi / 2 - table.heading_rad) % 360.0, battery_pct=95.0)
+    found = guessed(log).mapping["columns"]
+    assert found["trial"] == {"from": "mission"}
+    assert found["left_m_s"] == {"from": "left_kmh", "unit": "km/h"}
+    assert (found["x_m"]["from"], found["y_m"]["from"]) == ("easting", "northing")
+    assert found["heading_rad"] == {"from": "course", "unit": "deg", "clockwise": True, "zero_deg": 90}
+
+
+@pytest.mark.parametrize(("name", "size", "unit"), [("omega_deg", 180 / np.pi, {"unit": "deg/s"}), ("omega_rad", 1.0, {})])
+def test_a_turn_rate_may_have_the_unit_of_an_angle(name, size, unit):
+    table = measured(NOMINAL, trials=4)
+    forward, turn = (table.left_m_s + table.right_m_s) / 2, (table.right_m_s - table.left_m_s) / BASE_M
+    log = pd.DataFrame({"run": table.trial, "ms": 1e3 * table.t_s, "v": forward, name: size * turn})
+    found = guessed(log.assign(px=table.x_m, py=table.y_m, theta=table.heading_rad)).mapping
+    assert found["columns"]["forward_m_s"] == {"from": "v"}
+    assert found["columns"]["turn_rad_s"] == {"from": name, **unit}
+    assert "wheelbase_m" in found
+
+
 SLIPPING = hidden(turn_slip={"slip_s": 0.12})
 TURNS = [f"pose.orientation.{axis}" for axis in "xyzw"]
 PLACES = ("pose.position.x", "pose.position.y")

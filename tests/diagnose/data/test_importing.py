@@ -73,6 +73,7 @@ def test_the_mapping_is_kept_beside_the_data_and_used(log):
         ("unit: cm", "unit: furlong", "unknown unit 'furlong'"),
         ("unit: ms", "unit: milliseconds", "unknown unit 'milliseconds'. Did you mean 'ms'?"),
         ("unit: deg", "unit: Degree", "unknown unit 'Degree'. Did you mean 'deg'?"),
+        ("vl, unit: mm/s", "vl, unit: rpm", "left_m_s: rpm is no unit here; .* scale instead, the wheel's radius in metres"),
         ("from: X", "form: X", "x_m is .*; write {from: COLUMN"),
         ("clockwise", "clokwise", "Did you mean 'clockwise'"),
         ("from: X,", "from: x,", "asks for an unknown column 'x'"),

@@ -44,6 +44,16 @@ def test_an_effect_that_promises_nothing_is_not_fitted():
     assert added.model == start.model
 
 
+def of_the_package(starts):
+    """A `starts_from`; what one of a user's returns is looked at before."""
+
+    def found(_wheels):
+        return starts
+
+    found.__module__ = "bns.physics.effects.told"
+    return found
+
+
 def test_starts_that_an_effect_proposes_are_held_within_its_bounds():
     """As those of a patch of floor on a map are; what is no number is dropped."""
     problem, base, effects = fitted(NOMINAL, hidden(wheelbase={"factor": 1.0}), trials=4)
@@ -56,7 +66,7 @@ def test_starts_that_an_effect_proposes_are_held_within_its_bounds():
         (((float("nan"), *neutral[1:]), neutral), [neutral]),
         (((float("nan"), *neutral[1:]),), [neutral]),
     ):
-        told = replace(patch, name=f"told-{len(proposed)}-{proposed[0][0]}", starts_from=lambda _, starts=proposed: starts)
+        told = replace(patch, name=f"told-{len(proposed)}-{proposed[0][0]}", starts_from=of_the_package(proposed))
         assert list(_starts(told, given, base.model)) == used
         for values in _starts(told, given, base.model):
             base.model.with_active(told, values)

@@ -32,6 +32,8 @@ _LARGE_RAD = DEFAULTS.data.guess_degrees
 _KINDS = {"t_s": "s", "x_m": "m", "y_m": "m", "heading_rad": "rad", TURN: "rad/s"}
 _COUNTS = re.compile(r"\b(ticks?|counts?|encoders?|enc|steps?|pulses?)\b")
 _TURNING = {"rad/s", "deg/s"}
+_A_SECOND_OF = {"rad": "rad/s", "deg": "deg/s"}
+"""A turn rate's unit where its name ends with the unit of an angle: `omega_deg`."""
 _A_SECOND = re.compile(r"\b(s|sec|second|hz|rate|speed|vel|velocity)$")
 
 
@@ -107,7 +109,8 @@ def _fits(column: str, said: str) -> bool:
         return False
     if unit is None or column in {"trial", "heading_rad", *COMMANDS}:
         return True
-    return UNITS[unit][0] == _KINDS.get(column, "m/s") or len(unit) == 1
+    kind = _KINDS.get(column, "m/s")
+    return UNITS[unit][0] == kind or len(unit) == 1 or (column == TURN and unit in _A_SECOND_OF)
 
 
 def _each(words: tuple[str, ...], names: Mapping[str, str]) -> Iterator[str]:
@@ -138,10 +141,11 @@ def unit_of_column(column: str, name: str, values: pd.Series) -> dict[str, Any]:
     numbers = pd.to_numeric(values, errors="coerce")
     if column == "t_s" and numbers.isna().all():
         return {"unit": "date"}
-    kind = _KINDS.get(column, "m/s")
+    kind, angles = _KINDS.get(column, "m/s"), _A_SECOND_OF if column == TURN else {}
     for unit, (measures, size) in UNITS.items():
-        if measures == kind and size != 1.0 and re.search(rf"\b{' '.join(re.findall('[a-z]+', unit))}$", said):
-            return {"unit": unit}
+        fits = (measures == kind or unit in angles) and size != 1.0
+        if fits and re.search(rf"\b{' '.join(re.findall('[a-z]+', unit))}$", said):
+            return {"unit": angles.get(unit, unit)}
     if column == "t_s":
         step = float(numbers.diff().abs().replace(0, np.nan).median())
         return next(({"unit": unit} for least, unit in _STEPS if step > least), {})

@@ -8,15 +8,18 @@ from collections.abc import Mapping, Sequence
 from bns.diagnose.data.mapping import FORWARD, TURN, UNITS
 
 WORDS: dict[str, tuple[str, ...]] = {
-    "trial": ("trial", "run", "episode", "experiment"),
+    "trial": ("trial", "run", "episode", "experiment", "mission", "lap"),
     "t_s": ("t", "t s", "time", "stamp", "timestamp", "ms", "us", "ns"),
     "left_m_s": ("left", "vleft", "vl", "wl", "phi l", "l"),
     "right_m_s": ("right", "vright", "vr", "wr", "phi r", "r"),
     FORWARD: ("v", "linear x", "twist x", "vx", "forward velocity", "linear velocity", "forward", "speed", "velocity"),
     TURN: ("omega", "angular z", "w", "wz", "yaw rate", "yawrate", "angular velocity", "turn rate"),
-    "x_m": ("position x", "pos x", "px", "tx", "x"),
-    "y_m": ("position y", "pos y", "py", "ty", "y"),
-    "heading_rad": ("yaw", "heading", "theta", "psi", "compass", "orientation", "rotation z", "rz"),
+    "x_m": ("position x", "pos x", "px", "tx", "x", "easting", "east"),
+    "y_m": ("position y", "pos y", "py", "ty", "y", "northing", "north"),
+    "heading_rad": (
+        *("yaw", "heading", "theta", "psi", "compass", "orientation", "rotation z", "rz"),
+        *("course", "cog", "bearing", "azimuth"),
+    ),
 }
 """Column of the table -> words that its sources have in their names, the surer first."""
 QUATERNIONS = (

@@ -47,7 +47,7 @@ def test_lines_on_a_floor_have_no_exponent():
 
 def test_an_interval_that_is_narrow_beside_its_number_has_two_ends():
     number = {"value": 0.100002, "low": 0.100001, "high": 0.100004, "unit": "m"}
-    assert _number("width_m", number) == "width_m = 0.1 m (95 %: 0.100001 to 0.100004)"
+    assert _number("width_m", number) == "width_m = 0.100002 m (95 %: 0.100001 to 0.100004)"
 
 
 def test_a_bare_number_has_no_unit_in_the_summary_of_a_model():
