@@ -21,6 +21,7 @@ import numpy as np
 from bns.errors import HardwareError, StopNotConfirmedError
 from bns.hardware.clock import RealClock
 from bns.hardware.guard.holder import CODE
+from bns.hardware.guard.line import twins_of
 from bns.hardware.guard.recipe import StopRecipe
 from bns.hardware.guard.signs import STOPPED, not_running
 from bns.hardware.guard.standby import ENDED
@@ -146,6 +147,7 @@ class Guard:
         self._next: _Process | None = None
         if not Path(port).exists():
             raise HardwareError(no_port(port))
+        self._setup["twins"] = twins_of(port, sysfs)
         self._start()
         self._next = self._standing_by()
 

@@ -6,6 +6,7 @@ import contextlib
 import os
 import select
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 with contextlib.suppress(ImportError):  # not on Windows, where a robot's port has no guard
@@ -34,13 +35,19 @@ def identity(port: str, sysfs: str) -> str | None:
     return None
 
 
-def where_it_is(wanted: str, sysfs: str) -> str | None:
-    """The name of the port at which a device is now; None where it is not."""
+def ports_of(wanted: str, sysfs: str) -> list[str]:
+    """The names of the ports at which there is such a device: cheap adapters may all have the same serial number."""
     try:
         names = sorted(entry.name for entry in (Path(sysfs) / "class" / "tty").iterdir())
     except OSError:
-        return None
-    return next((name for name in names if identity(name, sysfs) == wanted), None)
+        return []
+    return [name for name in names if identity(name, sysfs) == wanted]
+
+
+def twins_of(port: str, sysfs: str) -> list[str]:
+    """The names of other ports whose devices cannot be told from the one at this port."""
+    own = identity(port, sysfs)
+    return [] if own is None else [name for name in ports_of(own, sysfs) if name != Path(os.path.realpath(port)).name]
 
 
 def _text(file: Path) -> str:
@@ -71,9 +78,11 @@ def opened(port: str, baud: int) -> int:
 class Line:
     """`port` is the robot's, `near` our end of the driver's, -1 while they are closed; `link` points to the driver's end."""
 
-    def __init__(self, port: str, baud: int, link: str, poll: select.poll, sysfs: str = "/sys") -> None:
+    def __init__(
+        self, port: str, baud: int, link: str, poll: select.poll, sysfs: str = "/sys", twins: Sequence[str] = ()
+    ) -> None:
         self._name, self._baud, self._link, self._poll, self._sysfs = port, baud, Path(link), poll, sysfs
-        self._folder = Path(os.path.realpath(port)).parent
+        self._folder, self._twins = Path(os.path.realpath(port)).parent, twins
         self.port = self.near = self._far = -1
         self.at = port
         """The name under which the device was found last."""
@@ -83,11 +92,12 @@ class Line:
     def open(self) -> None:
         """Take the port, and make the line that the driver opens instead of it; OSError.
 
-        Only the device of the first time is opened: opening another one could start it. It may have come back under another name.
+        Only the device of the first time is opened: opening another one could start it. It may have come back under another
+        name, but not under that of a device like it which was there before.
         """
         name, found = self._name, identity(self._name, self._sysfs)
         if self.identity not in {None, found}:
-            moved = where_it_is(str(self.identity), self._sysfs)
+            moved = next((name for name in ports_of(str(self.identity), self._sysfs) if name not in self._twins), None)
             if moved is None and Path(self._name).exists():
                 raise OtherDeviceError(f"at {self._name} is {found or 'a device without a name'}, not {self.identity}")
             name, found = (self._name, found) if moved is None else (str(self._folder / moved), self.identity)

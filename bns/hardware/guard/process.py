@@ -48,7 +48,7 @@ class Guard:
         self._order = StopOrder(setup["stop"])
         self._poll = select.poll()
         self._poll.register(control, select.POLLIN)
-        self._line = Line(setup["port"], setup["stop"]["baud"], setup["link"], self._poll, setup["sysfs"])
+        self._line = Line(setup["port"], setup["stop"]["baud"], setup["link"], self._poll, setup["sysfs"], setup["twins"])
         self._line.identity = setup["identity"]
         self._heard = b""
         self._armed = self._gone = self._done = self._terminated = self._spoke = self._other = self._away = False

@@ -75,7 +75,7 @@ def armed_guard(tmp_path):
     near, far = socket.socketpair()
     with near, far:
         setup = {"process": os.getpid(), "silent_s": HANGS_S, "log": None, "link": str(tmp_path / "x" / "y")}
-        setup |= {"port": "none", "sysfs": "/sys", "identity": None, "gives_up_s": HANGS_S}
+        setup |= {"port": "none", "sysfs": "/sys", "identity": None, "twins": [], "gives_up_s": HANGS_S}
         guard = guard_process.Guard(setup | {"stop": RECIPES["serial"].as_json()}, far, near, Notes(None))
         near.send(b"a")
         guard._turn(1.0)

@@ -97,6 +97,27 @@ def test_a_robot_that_comes_back_under_another_name_is_stopped(tmp_path):
     robot.close()
 
 
+def test_another_device_that_cannot_be_told_from_the_robots_hears_nothing(tmp_path):
+    """Cheap adapters have all the same serial number."""
+    robot, sysfs = Robot("serial", tmp_path), tmp_path / "sys"
+    say_what_is_there(sysfs, robot.path, "0001", "1-1")
+    ours, theirs = os.openpty()
+    say_what_is_there(sysfs, os.ttyname(theirs), "0001", "1-2")
+    guard = Guard(str(robot.path), RECIPES["serial"], HANGS_S, tmp_path / "guard.jsonl", gives_up_s=1.5, sysfs=str(sysfs))
+    guard.arm()
+    (sysfs / "class" / "tty" / Path(os.path.realpath(robot.path)).name / "device").unlink()
+    robot.line.cut()
+    trial_dies(guard)
+    assert guard._process.wait(HANGS_S) == 0
+    assert [e["kind"] for e in outlive._events(tmp_path)][-1] == "gave-up"
+    os.set_blocking(ours, False)
+    with pytest.raises(BlockingIOError):
+        os.read(ours, 1)
+    os.close(ours)
+    os.close(theirs)
+    robot.close()
+
+
 def test_a_guard_whose_port_never_comes_back_ends_after_the_time_that_the_rig_says(tmp_path):
     robot = Robot("serial", tmp_path)
     guard = Guard(str(robot.path), RECIPES["serial"], HANGS_S, tmp_path / "guard.jsonl", gives_up_s=1.5)
