@@ -16,6 +16,7 @@ from bns.store.archive.write import archive
 from bns.store.read.reader import load
 from bns.store.record import RunRecord
 from bns.sweep.expand.grid import parse_stored, parse_sweep
+from bns.sweep.expand.order import ordered_specs
 from bns.sweep.forecast.pace import Pace
 from bns.sweep.forecast.plan import START_UP_S, plan, work
 from bns.sweep.jobs.executor import SerialExecutor
@@ -219,6 +220,18 @@ def test_pace_of_one_run_foretells_runs_of_any_other_size(changes):
     other = RunSpec(**changes)
     wall_s = costing(other, **PARTS).run["wall_s"]
     assert Pace.of(costing(RunSpec(evaluations=20), **PARTS)).seconds(other) == pytest.approx(wall_s)
+
+
+def test_an_estimate_is_the_sum_of_what_different_runs_cost(tmp_path):
+    sweep = parse_sweep(
+        "name: mixed\nrobot: khepera\nseeds: 2\nfixed: {evaluations: 40}\ngrid: {population_size: [20, 100, 400]}",
+        tmp_path / "mixed.yaml",
+    )
+    takes_s = [costing(spec, **PARTS).run["wall_s"] for spec in ordered_specs(sweep)]
+    assert len(takes_s) == 6
+    assert max(takes_s) > 1.1 * min(takes_s)
+    found = plan(sweep, tmp_path, 1, job=lambda spec: costing(spec, **PARTS), warm_up=lambda: None)
+    assert found.seconds_estimate == pytest.approx(sum(takes_s))
 
 
 def test_pace_of_a_run_that_shares_its_core_is_stretched():
