@@ -21,7 +21,7 @@ PARTS = {
     "whole_run": "a whole run against the core's peak",
     "snake": "the snake: physics, training, a whole run",
     "two_jobs": "two workers against one, and the sweep's overhead",
-    "forecast": "what a sweep is foretold to take",
+    "forecast": "what a sweep should take",
     "reading": "reading a study for a figure",
     "figures": "drawing a whole study",
     "page": "bns explore in a browser",

@@ -1,4 +1,4 @@
-"""What ``bns plan`` foretells from one short run, beside what the sweep then takes."""
+"""What ``bns plan`` forecasts from one short run, beside what the sweep then takes."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def measure(quick: bool) -> list[Line]:
     sweep, ratios = parse_sweep(TEXT, Path("mixed.yaml")), []
     for _ in range(1 if quick else 3):
         with tempfile.TemporaryDirectory() as folder:
-            foretold_s = plan(sweep, Path(folder), 1, warm_up=warm).seconds_estimate
+            forecast_s = plan(sweep, Path(folder), 1, warm_up=warm).seconds_estimate
             run_sweep(sweep, Path(folder), executor=SerialExecutor())
-            ratios.append(foretold_s / load(folder, "runs")["wall_s"].sum())
-    note = "foretold over measured: " + ", ".join(f"{ratio:.2f}" for ratio in ratios)
+            ratios.append(forecast_s / load(folder, "runs")["wall_s"].sum())
+    note = "forecast over measured: " + ", ".join(f"{ratio:.2f}" for ratio in ratios)
     return [at_most("bns plan of a mixed sweep against its run", median(max(r, 1 / r) for r in ratios), 1.5, "x", note=note)]
