@@ -9,7 +9,8 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from numbers import Real
 from types import CodeType
@@ -34,7 +35,8 @@ def applied(effect: Effect, signal: S, values: Mapping[str, Any]) -> S:
         result: S = effect.apply(signal, **values)
         return result
     try:
-        given = effect.apply(signal, **values)
+        with _locked(signal):
+            given = effect.apply(signal, **values)
     except (BnsError, MemoryError):
         raise
     except ArithmeticError as fault:  # as of a formula: it may have no value at these numbers alone
@@ -102,7 +104,32 @@ def _checked(effect: Effect, signal: S, given: Any, values: Mapping[str, Any]) -
             what = f"{field.name} is not finite (nan or inf) somewhere on these trials with {dict(values)}"
             write = "Write it so that it is finite for every speed, at rest and in steps of length 0 too."
             raise ModelError(_said(effect, effect.apply, f"{what}. {write}"))
-    return given
+    return _unlocked(given)
+
+
+@contextmanager
+def _locked(signal: Any) -> Iterator[None]:
+    """Arrays that cannot be written: other effects and other numbers of this one start from the same signal."""
+    locked = [array for array in _arrays(signal) if array.flags.writeable]
+    for array in locked:
+        array.flags.writeable = False
+    try:
+        yield
+    finally:
+        for array in locked:
+            array.flags.writeable = True
+
+
+def _unlocked(given: S) -> S:
+    """A view of an array that was locked stays so; compiled code takes arrays that can be written."""
+    fields = [field.name for field in dataclasses.fields(given)]  # type: ignore[arg-type]  # all signals are dataclasses
+    views = [n for n in fields if isinstance(a := getattr(given, n), np.ndarray) and not a.flags.writeable]
+    return dataclasses.replace(given, **{n: getattr(given, n).copy(order="K") for n in views}) if views else given  # type: ignore[type-var]
+
+
+def _arrays(signal: Any) -> list[Array]:
+    values = [getattr(signal, field.name) for field in dataclasses.fields(signal)]
+    return [value for value in values if isinstance(value, np.ndarray)]
 
 
 def _what_it_must_be(signal: Any, before: Any, after: Any) -> str:
@@ -155,6 +182,9 @@ def _raised(effect: Effect, signal: Any, values: Mapping[str, Any], fault: Excep
     apply, kind = effect.apply, type(signal).__name__
     if isinstance(fault, AttributeError) and isinstance(fault.obj, type(signal)):
         return _said(effect, apply, _not_there(fault), fault)
+    if "read-only" in str(fault) or "readonly" in str(fault):
+        what = f"its apply writes into the arrays of the {kind} that it gets, and others use these"
+        return _said(effect, apply, f"{what}. Let it return dataclasses.replace(...) with new arrays.", fault)
     called = fault.__traceback__ is not None and fault.__traceback__.tb_next is None
     if isinstance(fault, TypeError) and called:  # not raised within it: it was never entered
         must = f"def apply({', '.join([kind.lower(), *values])})"

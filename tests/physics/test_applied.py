@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 
@@ -152,3 +153,40 @@ def test_no_effect_acts_without_being_looked_at():
     root = Path(bns.__file__).parent
     acting = [path for path in root.rglob("*.py") if re.search(r"effect\.apply\(", path.read_text(encoding="utf-8"))]
     assert [path.name for path in acting] == ["applied.py"]
+
+
+def _scaled_in_place(wheels, k):
+    wheels.left_m_s[:] *= k
+    return wheels
+
+
+def _scaled_into(wheels, k):
+    np.multiply(wheels.left_m_s, k, out=wheels.left_m_s)
+    return wheels
+
+
+@numba.njit
+def _written(array, k):
+    array[0, 0] = k
+
+
+def _scaled_by_numba(wheels, k):
+    _written(wheels.left_m_s, k)
+    return wheels
+
+
+@pytest.mark.parametrize("apply", [_scaled_in_place, _scaled_into, _scaled_by_numba])
+def test_an_effect_that_writes_into_what_it_gets_is_refused(apply):
+    wheels = Wheels(np.ones((2, 3)), np.ones((2, 3)), ONES, 0.1)
+    with pytest.raises(EffectError, match=r"mine .*line \d+.*writes into the arrays of the Wheels.*dataclasses\.replace"):
+        applied(own("wheel", apply), wheels, {"k": 0.5})
+    assert (wheels.left_m_s == 1).all()
+    wheels.left_m_s[0, 0] = 2  # what comes after may write again
+
+
+def test_a_view_of_what_it_gets_may_be_written_by_what_comes_after():
+    wheels = Wheels(np.ones((2, 3)), np.ones((2, 3)), ONES, 0.1)
+    given = applied(own("wheel", lambda w, k: replace(w, left_m_s=w.right_m_s[:, ::-1])), wheels, {"k": 0.5})
+    assert given.left_m_s.flags.writeable
+    given.left_m_s[0, 0] = 7
+    assert (wheels.right_m_s == 1).all()
