@@ -94,3 +94,9 @@ class Guesses:
         "Larger headings are taken to be degrees: radians that are not wrapped can be of any size, but are rarely "
         f"this large; {BY_HAND}.",
     )
+    guess_still: float = setting(
+        0.1,
+        "of the furthest",
+        "A tracked body that went less far than this, compared with the one that went furthest, is not proposed as the "
+        f"robot; {BY_HAND}.",
+    )

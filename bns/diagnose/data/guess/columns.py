@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -29,6 +30,7 @@ RADIUS, METRES_A_COUNT = "RADIUS_M", "METRES_A_COUNT"
 """Stand where a number is that no log tells: the wheel's radius, and the way of a wheel for one count."""
 _STEPS = DEFAULTS.data.guess_units
 _LARGE_RAD = DEFAULTS.data.guess_degrees
+_STILL = DEFAULTS.data.guess_still
 _KINDS = {"t_s": "s", "x_m": "m", "y_m": "m", "heading_rad": "rad", TURN: "rad/s"}
 _COUNTS = re.compile(r"\b(ticks?|counts?|encoders?|enc|steps?|pulses?)\b")
 _TURNING = {"rad/s", "deg/s"}
@@ -39,7 +41,7 @@ _A_SECOND = re.compile(r"\b(s|sec|second|hz|rate|speed|vel|velocity)$")
 
 def of_columns(table: pd.DataFrame) -> dict[str, Any]:
     """Entries of a mapping, as far as names tell; a column that has the table's own name already comes first."""
-    names = {str(name): words_of(str(name)) for name in table.columns}
+    names = {name: words_of(name) for name in _still_bodies_last(table)}
     quaternion = next((q for words in QUATERNIONS if len(q := list(_each(words, names))) == 4), None)
     free = {name: said for name, said in names.items() if name not in (quaternion or ())}
     entries = _entries(table, ("trial", "t_s"), free)
@@ -55,6 +57,21 @@ def of_columns(table: pd.DataFrame) -> dict[str, Any]:
     forward = {} if "scale" in by_numbers else by_numbers  # a robot's own units are those of its motors
     more = {**dict.fromkeys(COMMANDS, by_numbers), FORWARD: forward, "heading_rad": counted_from}
     return {name: {**entry, **more.get(name, {})} for name, entry in entries.items()}
+
+
+def _still_bodies_last(table: pd.DataFrame) -> list[str]:
+    """The columns; of things that are told alike (``robot.position.x [m]``, ``table.position.x [m]``), what stood still last."""
+    names = [str(name) for name in table.columns]
+    parts = {name: name.partition(".")[::2] for name in names}
+    alike = Counter(rest for _, rest in parts.values() if rest)
+    moved: dict[str, float] = {}
+    for name, (body, rest) in parts.items():
+        unit = unit_of(words_of(name))
+        if alike[rest] > 1 and unit is not None and UNITS[unit][0] == "m":
+            places = pd.to_numeric(table[name], errors="coerce")
+            moved[body] = max(moved.get(body, 0.0), float(places.quantile(0.95) - places.quantile(0.05)))
+    still = {body for body, far in moved.items() if far < _STILL * max(moved.values())}
+    return sorted(names, key=lambda name: parts[name][0] in still)
 
 
 def motions_of(table: pd.DataFrame) -> dict[str, Any] | None:

@@ -45,7 +45,7 @@ class _Layout:
 
 def is_motion_capture(path: Path) -> bool:
     """Whether the file begins as Motive or Vicon begin theirs."""
-    with _opened(path) as file:
+    with opened_text(path) as file:
         first = file.readline(len(_MOTIVE) + len(max(_VICON, key=len))).strip()  # a file of another kind may be one long line
     return first.startswith(_MOTIVE) or first.strip(_EMPTY) in _VICON
 
@@ -55,7 +55,7 @@ def read_motion_capture(path: Path) -> pd.DataFrame:
 
     DataError if the file has no body, no time, or names its columns otherwise.
     """
-    with _opened(path) as file:
+    with opened_text(path) as file:
         lines = iter(file)
         head = list(islice(lines, _MOST_HEAD))
         layout = _motive(path, head) if head[0].startswith(_MOTIVE) else _vicon(path, chain(head, lines))
@@ -76,13 +76,15 @@ def read_motion_capture(path: Path) -> pd.DataFrame:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[TextIO]:
+def opened_text(path: Path) -> Iterator[TextIO]:
+    """A file of text, packed or not, without its byte order mark."""
     opened = gzip.open if path.suffix == ".gz" else open
     with opened(path, "rt", encoding="utf-8-sig", errors="replace") as file:
         yield cast(TextIO, file)
 
 
-def _cells(line: str, separator: str = ",") -> list[str]:
+def cells_of(line: str, separator: str = ",") -> list[str]:
+    """The cells of a line."""
     return [cell.strip() for cell in next(csv.reader([line], delimiter=separator), [])]
 
 
@@ -99,7 +101,7 @@ def _named_row(path: Path, rows: Sequence[list[str]]) -> int:
 
 def _motive(path: Path, head: Sequence[str]) -> _Layout:
     """Rows of the kind of thing, of its name, of an identifier (of a parent), of the quantity, and of the axis, in this order."""
-    rows = [_cells(line) for line in head]
+    rows = [cells_of(line) for line in head]
     said = dict(zip(rows[0][::2], rows[0][1::2], strict=False))
     at = _named_row(path, rows)
     above = [row for row in rows[1:at] if any(row)]
@@ -144,9 +146,9 @@ def _vicon(path: Path, lines: Iterator[str]) -> _Layout:
         )
     head = list(islice(lines, _MOST_HEAD))
     separator = max(",;\t", key="".join(head).count)
-    rows = [_cells(line, separator) for line in head]
+    rows = [cells_of(line, separator) for line in head]
     at = _named_row(path, rows)
-    rate = _number(rows[0][0] if rows[0] else "")
+    rate = number_of(rows[0][0] if rows[0] else "")
     if at < 2 or len(rows) < at + 2 or not rate > 0:
         raise DataError(f"{path} lacks the names of its bodies, the units of its columns or its frame rate. Export it again.")
     named = enumerate(zip(_carried(rows[at - 1], len(rows[at])), rows[at], rows[at + 1], strict=False))
@@ -157,7 +159,8 @@ def _vicon(path: Path, lines: Iterator[str]) -> _Layout:
     return _Layout({0: _FRAME, **found}, before + at + 2, rows_of_it, separator, rate)
 
 
-def _number(text: str) -> float:
+def number_of(text: str) -> float:
+    """NaN where it is none."""
     try:
         return float(text)
     except ValueError:

@@ -11,6 +11,7 @@ from pathlib import Path
 import pandas as pd
 
 from bns.diagnose.data.sources.motion_capture import is_motion_capture, read_motion_capture
+from bns.diagnose.data.sources.qualisys import is_qualisys, read_qualisys
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 from bns.measurements import COLUMNS
@@ -39,6 +40,8 @@ def read_text_table(path: Path) -> pd.DataFrame:
     """
     if is_motion_capture(path):
         return read_motion_capture(path)
+    if is_qualisys(path):
+        return read_qualisys(path)
     comments, first, second = _head(path)
     separator = _separator(first, path)
     decimal = _decimal(separator, second or first)
