@@ -114,3 +114,9 @@ def test_a_recording_that_lacks_something_says_what_and_what_to_do(tmp_path, tex
         read_table(tmp_path / "bad.tsv")
     assert "bad.tsv" in str(error.value)
     assert "export 6D data as TSV" in str(error.value)
+
+
+def test_frames_without_times_are_counted_by_the_frequency(tmp_path):
+    lines = [line.split("\t") for line in PUBLISHED.splitlines()]
+    (tmp_path / "ship.tsv").write_text("\n".join("\t".join([*line[:1], *line[2:]] if len(line) > 9 else line) for line in lines))
+    assert read_table(tmp_path / "ship.tsv")["time [s]"].tolist() == [0.0, 0.01]
