@@ -13,7 +13,7 @@ import pandas as pd
 
 from bns.diagnose.data.apply_mapping import repeated
 from bns.diagnose.data.far_origin import refuse_far_origin
-from bns.diagnose.data.odd_commands import half_told, never_told, refuse_untold, untold_trials
+from bns.diagnose.data.odd_commands import half_told, lost_commands, never_told, refuse_untold, untold_trials
 from bns.diagnose.data.reckoned import reckoned
 from bns.diagnose.data.still_heading import refuse_still_coordinate, refuse_still_heading
 from bns.diagnose.data.units import check_units
@@ -75,7 +75,8 @@ def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     note = check_units(usable, trials)
     refuse_far_origin(usable)  # of positions in mm and cm the unit is said first
     unit: tuple[int, str] | None = (int(usable.index[0]), note) if note else None
-    oddities = (unit, odd, untold_trials(usable, trials), never_told(usable), _nameless(table), reckoned(usable, trials))
+    empty = (untold_trials(usable, trials), never_told(usable), lost_commands(usable, trials))
+    oddities = (unit, odd, *empty, _nameless(table), reckoned(usable, trials))
     names = table["trial"].astype(object).where(table["trial"].notna(), "")
     told = [Finding(str(names.iloc[row]), row, text) for row, text in filter(None, oddities)]
     return usable, told + findings

@@ -9,9 +9,12 @@ import numpy as np
 import pandas as pd
 
 from bns.diagnose.data.spread import moved
+from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError, in_both
 from bns.measurements import COMMANDS
 
+_MOMENT_S, _ALIKE = DEFAULTS.data.lost_commands
+_FEWEST = DEFAULTS.data.lost_commands_fewest
 NEVER_TOLD = "all commands are 0 in all trials: the robot was never told to move. Are these the columns of the commands?"
 _WRITE = "Are these the columns of the commands? A log needs the speed of both wheels, or of the body, where it changes."
 
@@ -50,6 +53,41 @@ def untold_trials(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]])
         f"{said}. {'But' if len(empty) == 1 else f'In {len(moving)} of them'} it moves, which counts as an error of every model "
         f"and in every fit. If the commands were not logged, leave {'it' if len(moving) == 1 else 'them'} out: "
         f"{in_both(typed, f'log.without({named})')}{rest}"
+    )
+
+
+def lost_commands(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -> tuple[int, str] | None:
+    """The first row of a command 0 that stands for a moment between two that are alike, how often, and how much way it takes.
+
+    ``trials``: names and row numbers. No motor follows so short a command; a program that writes 0 beside its speeds, or a log
+    that lost some, leaves such rows, and the robot then goes further than it seems to have been told to.
+    """
+    first, lasted, lacking_m, told_m = -1, list[float](), 0.0, 0.0
+    by_trial = np.repeat(np.arange(len(trials)), [len(rows) for _, rows in trials])
+    commands = np.full((len(table), 2), np.nan)
+    at_all = np.concatenate([np.zeros(0, int), *(rows for _, rows in trials)])
+    commands[at_all] = table[list(COMMANDS)].iloc[at_all].groupby(by_trial).ffill().to_numpy(float)
+    times = table["t_s"].to_numpy(float)
+    for _, rows in trials:
+        told, t = commands[rows], times[rows]
+        begins = np.flatnonzero(np.r_[True, (told[1:] != told[:-1]).any(axis=1)]) if len(told) else np.zeros(0, int)
+        at, held_s = t[begins], np.diff(np.r_[t[begins], t[-1:]])
+        speed = np.abs(told[begins]).max(axis=1, initial=0.0)
+        told_m += float(np.nansum(speed * held_s))
+        inner = np.arange(1, len(begins) - 1)
+        before, after = told[begins[inner - 1]], told[begins[inner + 1]]
+        alike = (np.abs(after - before) <= _ALIKE * np.abs(before).max(axis=1, keepdims=True, initial=0.0)).all(axis=1)
+        lost = inner[(speed[inner] == 0) & (speed[inner - 1] > 0) & alike & (held_s[inner] <= _MOMENT_S)]
+        first = int(table.index[rows[begins[lost[0]]]]) if first < 0 and len(lost) else first
+        lasted += held_s[lost].tolist()
+        lacking_m += float((speed[lost - 1] * (at[lost + 1] - at[lost])).sum())
+    if len(lasted) < _FEWEST:
+        return None
+    share = lacking_m / (told_m + lacking_m)
+    return first, (
+        f"{len(lasted)} times both commands are 0 for {1e3 * min(lasted):.0f} to {1e3 * max(lasted):.0f} ms between two that are "
+        f"alike, the first time here: {share:.1%} of the way. No motor follows that. If the robot was not told so (a sender that "
+        "writes 0 beside its speeds, a log with losses), take these rows out: with them, it seems to go that much too far"
     )
 
 

@@ -1,0 +1,69 @@
+"""Commands of 0 for a moment, between two that are alike: as in the logs of the iRobot Create robots of UTIAS MRCLAM."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bns.diagnose.data.checks import checked, rows_by_trial
+from bns.diagnose.data.odd_commands import lost_commands
+
+STEP_S = 0.01
+
+
+def log(zeros, after=0.058, trials=("a", "b")):
+    """Two trials of 10 s at 0.057 m/s; ``zeros``: how many moments without a command in the second, each of how many rows."""
+    count, rows = zeros
+    parts = []
+    for name in trials:
+        speed = np.full(1000, 0.057)
+        if name == "b":
+            for moment in range(count):
+                begin = 100 + 80 * moment
+                speed[begin : begin + rows] = 0.0
+                speed[begin + rows : begin + 40] = after
+        t = STEP_S * np.arange(1000)
+        parts.append(pd.DataFrame({"trial": name, "t_s": t, "left_m_s": speed, "right_m_s": speed, "x_m": 0.057 * t}))
+    return pd.concat(parts, ignore_index=True).assign(y_m=0.0, heading_rad=0.0)
+
+
+def told(table):
+    return lost_commands(table, rows_by_trial(table))
+
+
+@pytest.mark.parametrize("rows", [1, 5])
+def test_moments_without_a_command_are_told_with_the_way_that_they_take(rows):
+    row, text = told(log((8, rows)))
+    assert row == 1100
+    assert f"8 times both commands are 0 for {10 * rows} to {10 * rows} ms" in text
+    share = 8 * rows * STEP_S * 0.057 / (20 * 0.057)
+    assert f"the first time here: {share:.1%} of the way" in text
+
+
+@pytest.mark.parametrize(
+    "table",
+    [log((2, 2)), log((8, 9)), log((8, 2), after=0.064), log((8, 2), after=-0.057), log((0, 0))],
+    ids=["twice", "long enough to follow", "then faster", "then back", "none"],
+)
+def test_commands_that_may_be_meant_are_not(table):
+    assert told(table) is None
+
+
+def test_a_moment_of_another_speed_is_not():
+    table = log((8, 2))
+    table[["left_m_s", "right_m_s"]] = table[["left_m_s", "right_m_s"]].replace(0.0, 0.03)
+    assert told(table) is None
+
+
+def test_they_are_found_in_a_log_and_change_nothing():
+    table = log((8, 2))
+    table.loc[3, "t_s"] = table.loc[2, "t_s"]  # a row that is left out does not shift the others' numbers
+    usable, findings = checked(table)
+    assert [(one.trial, one.row) for one in findings if "both commands are 0" in one.text] == [("b", 1100)]
+    assert usable[["left_m_s", "right_m_s"]].equals(table.loc[usable.index, ["left_m_s", "right_m_s"]])
+
+
+def test_rows_without_a_command_hold_the_last_one():
+    table = log((8, 2))
+    empty = table.index % 5 == 4
+    table.loc[empty, ["left_m_s", "right_m_s"]] = np.nan
+    assert "8 times" in told(table)[1]
