@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ import pandas as pd
 from bns.diagnose.data.located import LocatedMapping, located
 from bns.diagnose.data.mapping import UNITS
 from bns.diagnose.data.merge_topics import held, merged, named_topics, of_topics, wheels_from_body
+from bns.diagnose.data.odd_commands import with_commands_held
 from bns.diagnose.data.quaternions import yaw
 from bns.diagnose.data.relative_motions import relative_motions
 from bns.diagnose.data.split_trials import split
@@ -55,9 +56,16 @@ def applied(
             out = split(out, *next(iter(rules["trials"].items())))
     if "trial" not in out.columns:
         out.insert(0, "trial", 0)
+    if rules.get("lost_commands") == "held" and _are_numbers(out, ("t_s", *COMMANDS)):
+        out = with_commands_held(out, list(out.groupby("trial", sort=False).indices.values()))
     if rules.get("repeated_poses") == "lost":
         out.loc[repeated(out), list(POSE)] = np.nan
     return out[[*(c for c in COLUMNS if c in out.columns), *(c for c in out.columns if c not in COLUMNS)]]
+
+
+def _are_numbers(table: pd.DataFrame, columns: Sequence[str]) -> bool:
+    """Whether these columns are there and hold numbers; what is wrong with them is said when the whole table is checked."""
+    return all(name in table.columns and pd.api.types.is_numeric_dtype(table[name]) for name in columns)
 
 
 def _check_slips(table: pd.DataFrame, rules: LocatedMapping) -> None:

@@ -72,12 +72,13 @@ _SI = {
     "left_m": "m",
     "right_m": "m",
 }
-REPEATED = ("kept", "lost")
+_WORDS = {"repeated_poses": ("kept", "lost"), "lost_commands": ("kept", "held")}
+"""Keys of the table whose values are words: the first by default."""
 SPLITS = ("standing_s", "lasting_s", "gap_s")
 _LENGTHS = ("wheelbase_m", "hold_commands_s")
 DURATION, WAYS = "duration_s", ("left_m", "right_m")
 """Of a log of single relative motions (``relative: true``): how long each took, and the way of each wheel in it."""
-_TABLE_KEYS = ("columns", "also", *_LENGTHS, "trials", "repeated_poses", "relative")
+_TABLE_KEYS = ("columns", "also", *_LENGTHS, "trials", *_WORDS, "relative")
 _ALSO_KEYS = ("file", "columns")
 _KEYS = ("from", "unit", "scale", "offset", "clockwise", "zero_deg", "up", "counts")
 _NUMBERS, _FLAGS = ("scale", "offset", "zero_deg"), ("clockwise", "counts")
@@ -125,9 +126,10 @@ def checked_mapping(tree: Any, path: Path | None = None, lines: Lines | None = N
     for key in rules:
         with rules.at(key):
             _check_keys("", {key: None}, _TABLE_KEYS)
-    with rules.at("repeated_poses"):
-        if rules.get("repeated_poses", "kept") not in REPEATED:
-            raise DataError(unknown_name("word for repeated_poses", rules["repeated_poses"], REPEATED))
+    for name, words in _WORDS.items():
+        with rules.at(name):
+            if rules.get(name, words[0]) not in words:
+                raise DataError(unknown_name(f"word for {name}", rules[name], words))
     for name in (name for name in _LENGTHS if name in rules):
         with rules.at(name):
             if not _positive(rules[name]):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -62,33 +63,61 @@ def lost_commands(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]])
     ``trials``: names and row numbers. No motor follows so short a command; a program that writes 0 beside its speeds, or a log
     that lost some, leaves such rows, and the robot then goes further than it seems to have been told to.
     """
-    first, lasted, lacking_m, told_m = -1, list[float](), 0.0, 0.0
-    by_trial = np.repeat(np.arange(len(trials)), [len(rows) for _, rows in trials])
+    lost, told_m = _lost(table, [rows for _, rows in trials])
+    if len(lost) < _FEWEST:
+        return None
+    lasted = [one.held_s for one in lost]
+    lacking_m = sum(one.held_s * one.speed_m_s for one in lost)
+    return int(table.index[lost[0].rows[0]]), (
+        f"{len(lost)} times both commands are 0 for {1e3 * min(lasted):.0f} to {1e3 * max(lasted):.0f} ms between two that are "
+        f"alike, the first time here: {lacking_m / (told_m + lacking_m):.1%} of the way. No motor follows that. If the robot was "
+        "not told so (a sender that writes 0 beside its speeds, a log with losses), it seems to go that much too far: "
+        "`lost_commands: held` in the mapping of `bns import` puts the command before in their place"
+    )
+
+
+def with_commands_held(table: pd.DataFrame, trials: Sequence[np.ndarray]) -> pd.DataFrame:
+    """The table with the command before in place of each command 0 that `lost_commands` would tell. ``trials``: row numbers."""
+    commands = table[list(COMMANDS)].to_numpy(float, copy=True)
+    for one in _lost(table, trials)[0]:
+        commands[one.rows] = one.before
+    return table.assign(**{name: commands[:, number] for number, name in enumerate(COMMANDS)})
+
+
+@dataclass(frozen=True)
+class _Lost:
+    """A moment without a command: its rows (numbers), how long it lasts, and the command before it (both wheels, m/s)."""
+
+    rows: np.ndarray
+    held_s: float
+    before: np.ndarray
+
+    @property
+    def speed_m_s(self) -> float:
+        """Of the faster wheel."""
+        return float(np.abs(self.before).max())
+
+
+def _lost(table: pd.DataFrame, trials: Sequence[np.ndarray]) -> tuple[list[_Lost], float]:
+    """Moments without a command in trials, which are given by their rows' numbers, and the way commanded besides, m."""
+    of_trial = np.repeat(np.arange(len(trials)), [len(rows) for rows in trials])
+    at = np.concatenate([np.zeros(0, int), *trials])
     commands = np.full((len(table), 2), np.nan)
-    at_all = np.concatenate([np.zeros(0, int), *(rows for _, rows in trials)])
-    commands[at_all] = table[list(COMMANDS)].iloc[at_all].groupby(by_trial).ffill().to_numpy(float)
+    commands[at] = table[list(COMMANDS)].iloc[at].groupby(of_trial).ffill().to_numpy(float)
     times = table["t_s"].to_numpy(float)
-    for _, rows in trials:
+    found, told_m = list[_Lost](), 0.0
+    for rows in trials:
         told, t = commands[rows], times[rows]
         begins = np.flatnonzero(np.r_[True, (told[1:] != told[:-1]).any(axis=1)]) if len(told) else np.zeros(0, int)
-        at, held_s = t[begins], np.diff(np.r_[t[begins], t[-1:]])
+        held_s = np.diff(np.r_[t[begins], t[-1:]])
         speed = np.abs(told[begins]).max(axis=1, initial=0.0)
         told_m += float(np.nansum(speed * held_s))
         inner = np.arange(1, len(begins) - 1)
         before, after = told[begins[inner - 1]], told[begins[inner + 1]]
         alike = (np.abs(after - before) <= _ALIKE * np.abs(before).max(axis=1, keepdims=True, initial=0.0)).all(axis=1)
         lost = inner[(speed[inner] == 0) & (speed[inner - 1] > 0) & alike & (held_s[inner] <= _MOMENT_S)]
-        first = int(table.index[rows[begins[lost[0]]]]) if first < 0 and len(lost) else first
-        lasted += held_s[lost].tolist()
-        lacking_m += float((speed[lost - 1] * (at[lost + 1] - at[lost])).sum())
-    if len(lasted) < _FEWEST:
-        return None
-    share = lacking_m / (told_m + lacking_m)
-    return first, (
-        f"{len(lasted)} times both commands are 0 for {1e3 * min(lasted):.0f} to {1e3 * max(lasted):.0f} ms between two that are "
-        f"alike, the first time here: {share:.1%} of the way. No motor follows that. If the robot was not told so (a sender that "
-        "writes 0 beside its speeds, a log with losses), take these rows out: with them, it seems to go that much too far"
-    )
+        found += [_Lost(rows[begins[i] : begins[i + 1]], float(held_s[i]), told[begins[i - 1]]) for i in lost]
+    return found, told_m
 
 
 def never_told(table: pd.DataFrame) -> tuple[int, str] | None:

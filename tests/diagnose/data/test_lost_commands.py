@@ -4,8 +4,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.checks import checked, rows_by_trial
+from bns.diagnose.data.mapping import load_mapping
 from bns.diagnose.data.odd_commands import lost_commands
+from bns.errors import DataError
 
 STEP_S = 0.01
 
@@ -67,3 +70,26 @@ def test_rows_without_a_command_hold_the_last_one():
     empty = table.index % 5 == 4
     table.loc[empty, ["left_m_s", "right_m_s"]] = np.nan
     assert "8 times" in told(table)[1]
+
+
+def test_the_command_before_can_be_put_in_their_place():
+    table = log((8, 2))
+    held = applied(table, {"columns": {}, "lost_commands": "held"})
+    assert (held[["left_m_s", "right_m_s"]] > 0).all(axis=None)
+    lost = table["left_m_s"] == 0
+    assert held.loc[~lost].equals(applied(table, {"columns": {}}).loc[~lost])
+    assert set(held.loc[lost, "left_m_s"]) == {0.057}  # and not 0.058, which comes after
+    stops = log((8, 9))
+    assert applied(stops, {"columns": {}, "lost_commands": "held"}).equals(applied(stops, {"columns": {}}))
+
+
+def test_the_mapping_knows_the_words(tmp_path):
+    (tmp_path / "m.yaml").write_text("columns: {}\nlost_commands: drop\n")
+    with pytest.raises(DataError, match=r"m\.yaml, line 2: unknown word for lost_commands 'drop'. Valid: held, kept"):
+        load_mapping(tmp_path / "m.yaml")
+
+
+@pytest.mark.parametrize("wrong", [{"left_m_s": "fast"}, {}])
+def test_columns_that_are_lacking_or_no_numbers_are_left_to_the_checks(wrong):
+    table = log((8, 2)).drop(columns="left_m_s").assign(**wrong)
+    assert applied(table, {"columns": {}, "lost_commands": "held"}).equals(applied(table, {"columns": {}}))
