@@ -57,7 +57,7 @@ def applied(
     if "trial" not in out.columns:
         out.insert(0, "trial", 0)
     if rules.get("lost_commands") == "held" and _are_numbers(out, ("t_s", *COMMANDS)):
-        out = with_commands_held(out, list(out.groupby("trial", sort=False).indices.values()))
+        out = with_commands_held(out, [np.asarray(rows) for rows in out.groupby("trial", sort=False).indices.values()])
     if rules.get("repeated_poses") == "lost":
         out.loc[repeated(out), list(POSE)] = np.nan
     return out[[*(c for c in COLUMNS if c in out.columns), *(c for c in out.columns if c not in COLUMNS)]]
