@@ -13,7 +13,14 @@ import pandas as pd
 
 from bns.diagnose.data.apply_mapping import repeated
 from bns.diagnose.data.far_origin import refuse_far_origin
-from bns.diagnose.data.odd_commands import half_told, lost_commands, never_told, refuse_untold, untold_trials
+from bns.diagnose.data.odd_commands import (
+    half_told,
+    lost_commands,
+    never_told,
+    refuse_untold,
+    untold_begins,
+    untold_trials,
+)
 from bns.diagnose.data.reckoned import reckoned
 from bns.diagnose.data.still_heading import refuse_still_coordinate, refuse_still_heading
 from bns.diagnose.data.units import check_units
@@ -66,8 +73,13 @@ def checked(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Finding]]:
     chosen = np.concatenate([np.zeros(0, np.int64), *kept])
     usable = table.iloc[chosen].copy()
     usable[list(POSE)] = pose[chosen]
+    begins = np.zeros(len(table), bool)
     if not _tracked(usable).any():
         raise DataError("There is no tracked pose in these measurements: every x_m, y_m or heading_rad is empty.")
+    for trial, rows, text in untold_begins(usable, rows_by_trial(usable)):
+        findings.append(Finding(trial, int(usable.index[rows[0]]), text))
+        begins[usable.index[rows]] = True
+    usable = usable[~begins[usable.index]]
     trials = rows_by_trial(usable)
     refuse_untold(usable, trials)
     refuse_still_heading(usable, trials)

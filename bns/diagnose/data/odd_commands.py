@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from bns.diagnose.data.spread import moved
+from bns.diagnose.data.spread import drifts, moved
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError, in_both
-from bns.measurements import COMMANDS
+from bns.measurements import COMMANDS, POSE
 
 _MOMENT_S, _ALIKE = DEFAULTS.data.lost_commands
 _FEWEST = DEFAULTS.data.lost_commands_fewest
@@ -31,6 +31,19 @@ def half_told(table: pd.DataFrame) -> tuple[int, str] | None:
         f"{len(rows)} rows have a command for one wheel only, the first here ({lacks} is empty); an empty cell means that no "
         "command is in force, and such a wheel counts as told to stand. Fill both cells, or leave both empty"
     )
+
+
+def untold_begins(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -> list[tuple[str, np.ndarray, str]]:
+    """Of trials in which the robot moves before their first command: name, numbers of the rows before it, and what is odd."""
+    told = table[list(COMMANDS)].notna().any(axis=1).to_numpy()
+    times, poses, found = table["t_s"].to_numpy(float), table[list(POSE)].to_numpy(float), []
+    for name, rows in trials:
+        before = rows[: int(np.argmax(told[rows]))] if len(rows) and told[rows].any() else rows[:0]
+        if drifts(poses[before]):
+            lasted = f"{times[rows[len(before)]] - times[before[0]]:.2f} s ({len(before)} rows)"
+            said = f"the robot moves in the {lasted} before the first command: left out, since nobody knows why"
+            found.append((name, before, said))
+    return found
 
 
 def untold_trials(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]]) -> tuple[int, str] | None:

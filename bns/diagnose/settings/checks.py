@@ -147,6 +147,13 @@ class Checks:
         "Poses of a trial whose middle nine tenths spread by more, in position or heading, are of a robot that moves. The noise "
         f"of a tracker and the drift of a robot at rest stay below; {BY_HAND}.",
     )
+    drifts: tuple[float, float, float] = setting(
+        (0.003, 0.02, 6.0),
+        "m, rad, standard errors",
+        "A robot that goes or turns further before its first command, and by so many standard errors further than the noise, "
+        f"moves for a reason that nobody knows, and these poses are left out; {BY_HAND}.",
+    )
+    drifts_last: int = setting(5, "poses", f"How many of the last of these poses tell where it went; {BY_HAND}.")
     far_m: float = setting(
         1000.0,
         "m",
