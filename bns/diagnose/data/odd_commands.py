@@ -14,7 +14,7 @@ from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError, in_both
 from bns.measurements import COMMANDS, POSE
 
-_MOMENT_S, _ALIKE = DEFAULTS.data.lost_commands
+_MOMENT_S, _ALIKE, _LEAST = DEFAULTS.data.lost_commands
 _FEWEST = DEFAULTS.data.lost_commands_fewest
 NEVER_TOLD = "all commands are 0 in all trials: the robot was never told to move. Are these the columns of the commands?"
 _WRITE = "Are these the columns of the commands? A log needs the speed of both wheels, or of the body, where it changes."
@@ -76,17 +76,21 @@ def lost_commands(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]])
     ``trials``: names and row numbers. No motor follows so short a command; a program that writes 0 beside its speeds, or a log
     that lost some, leaves such rows, and the robot then goes further than it seems to have been told to.
     """
-    lost, told_m = _lost(table, [rows for _, rows in trials])
-    if len(lost) < _FEWEST:
+    lost, share = _lost(table, [rows for _, rows in trials])
+    if not lost:
         return None
     lasted = [one.held_s for one in lost]
-    lacking_m = sum(one.held_s * one.speed_m_s for one in lost)
     return int(table.index[lost[0].rows[0]]), (
         f"{len(lost)} times both commands are 0 for {1e3 * min(lasted):.0f} to {1e3 * max(lasted):.0f} ms between two that are "
-        f"alike, the first time here: {lacking_m / (told_m + lacking_m):.1%} of the way. No motor follows that. If the robot was "
+        f"alike, the first time here: {share:.1%} of the way. No motor follows that. If the robot was "
         "not told so (a sender that writes 0 beside its speeds, a log with losses), it seems to go that much too far: "
         "`lost_commands: held` in the mapping of `bns import` puts the command before in their place"
     )
+
+
+def count_lost(table: pd.DataFrame) -> int:
+    """How many commands `lost_commands` would tell in a table of one trial; 0 if there are too few."""
+    return len(_lost(table, [np.arange(len(table))])[0])
 
 
 def with_commands_held(table: pd.DataFrame, trials: Sequence[np.ndarray]) -> pd.DataFrame:
@@ -112,7 +116,10 @@ class _Lost:
 
 
 def _lost(table: pd.DataFrame, trials: Sequence[np.ndarray]) -> tuple[list[_Lost], float]:
-    """Moments without a command in trials, which are given by their rows' numbers, and the way commanded besides, m."""
+    """Moments without a command in trials, which are given by their rows' numbers, and the share of the way that they take.
+
+    None where they are few, or take hardly any way: speeds that were measured are 0 where a wheel turns back.
+    """
     of_trial = np.repeat(np.arange(len(trials)), [len(rows) for rows in trials])
     at = np.concatenate([np.zeros(0, int), *trials])
     commands = np.full((len(table), 2), np.nan)
@@ -130,7 +137,9 @@ def _lost(table: pd.DataFrame, trials: Sequence[np.ndarray]) -> tuple[list[_Lost
         alike = (np.abs(after - before) <= _ALIKE * np.abs(before).max(axis=1, keepdims=True, initial=0.0)).all(axis=1)
         lost = inner[(speed[inner] == 0) & (speed[inner - 1] > 0) & alike & (held_s[inner] <= _MOMENT_S)]
         found += [_Lost(rows[begins[i] : begins[i + 1]], float(held_s[i]), told[begins[i - 1]]) for i in lost]
-    return found, told_m
+    lacking_m = sum(one.held_s * one.speed_m_s for one in found)
+    share = lacking_m / (told_m + lacking_m) if found else 0.0
+    return (found, share) if len(found) >= _FEWEST and share >= _LEAST else ([], 0.0)
 
 
 def never_told(table: pd.DataFrame) -> tuple[int, str] | None:

@@ -18,12 +18,12 @@ class Checks:
         "If a larger fraction of the poses is repeated while the robot drives, the tracker is taken to be slower "
         f"than the log; {BY_HAND}.",
     )
-    lost_commands: tuple[float, float] = setting(
-        (0.06, 0.05),
-        "s, 1",
+    lost_commands: tuple[float, float, float] = setting(
+        (0.06, 0.05, 0.001),
+        "s, 1, 1",
         "Commands of 0 that last no longer than the first number, between two that differ by no more than this fraction, are "
-        "told as lost or spurious: the logs of the iRobot Create robots of UTIAS MRCLAM have single ones of 10 ms; "
-        f"{BY_HAND}.",
+        "told as lost or spurious if they take so much of the way (the third number): the logs of the iRobot Create robots of "
+        f"UTIAS MRCLAM have single ones of 10 ms; {BY_HAND}.",
     )
     lost_commands_fewest: int = setting(3, "times", f"Fewer are not told; {BY_HAND}.")
     jump_m: float = setting(0.02, "m", f"A smaller change of position is never called a jump; {BY_HAND}.")

@@ -6,6 +6,7 @@ import pytest
 
 from bns.diagnose.data.apply_mapping import applied
 from bns.diagnose.data.checks import checked, rows_by_trial
+from bns.diagnose.data.guess.mapping import guessed
 from bns.diagnose.data.mapping import load_mapping
 from bns.diagnose.data.odd_commands import lost_commands
 from bns.errors import DataError
@@ -57,6 +58,13 @@ def test_a_moment_of_another_speed_is_not():
     assert told(table) is None
 
 
+def test_moments_that_take_hardly_any_way_are_not_told():
+    table = log((8, 2))
+    assert told(table) is not None
+    fast = table.assign(**{name: table[name].where(table["trial"] == "b", 20.0) for name in ("left_m_s", "right_m_s")})
+    assert told(fast) is None
+
+
 def test_they_are_found_in_a_log_and_change_nothing():
     table = log((8, 2))
     table.loc[3, "t_s"] = table.loc[2, "t_s"]  # a row that is left out does not shift the others' numbers
@@ -93,3 +101,13 @@ def test_the_mapping_knows_the_words(tmp_path):
 def test_columns_that_are_lacking_or_no_numbers_are_left_to_the_checks(wrong):
     table = log((8, 2)).drop(columns="left_m_s").assign(**wrong)
     assert applied(table, {"columns": {}, "lost_commands": "held"}).equals(applied(table, {"columns": {}}))
+
+
+@pytest.mark.parametrize("zeros", [(8, 2), (2, 2)])
+def test_a_proposal_keeps_the_command_before_in_force(zeros):
+    table = log(zeros, trials=("b",)).rename(columns={"t_s": "time [ms]", "left_m_s": "v", "x_m": "x", "y_m": "y"})
+    table = table.assign(**{"time [ms]": 1e3 * table["time [ms]"], "w": 0.0}).drop(columns=["right_m_s", "trial"])
+    guess = guessed(table)
+    assert {"forward_m_s", "turn_rad_s"} <= set(guess.mapping["columns"])
+    assert guess.mapping.get("lost_commands") == ("held" if zeros[0] == 8 else None)
+    assert any("8 times both commands are 0 for a moment" in said for said in guess.remarks) == (zeros[0] == 8)

@@ -27,6 +27,7 @@ from bns.diagnose.data.guess.topics import of_topic_columns
 from bns.diagnose.data.guess.words import rank, unit_of, words_of
 from bns.diagnose.data.mapping import FORWARD, TURN
 from bns.diagnose.data.merge_topics import of_topics
+from bns.diagnose.data.odd_commands import count_lost
 from bns.diagnose.settings import DEFAULTS
 from bns.measurements import COMMANDS, POSE
 
@@ -109,10 +110,14 @@ def guessed(table: pd.DataFrame, others: Mapping[str, pd.DataFrame] | None = Non
         tree["wheelbase_m"] = METRES
     if also or of_topics(table) or _apart(table, everything):
         tree["hold_commands_s"] = float("inf")
+    lost = _lost_commands(tables[told], found[told]) if told is not None else 0
+    if lost:
+        tree["lost_commands"] = "held"
     if "trial" not in everything:
         read = [name, *(str(one["file"]) for one in also)]
         tree["trials"] = cut_into_trials(tables[told or name], found[told or name], [(tables[f], found[f]) for f in read])
     said = [*_remarks(everything, tables), *([_of_clocks(joined)] if joined else []), *_other_bodies(everything, tables)]
+    said += [_of_lost_commands(lost)] if lost else []
     return Guess(tree, tuple(said), tuple(_blanks(everything, tables)))
 
 
@@ -121,6 +126,23 @@ def _of_clocks(joined: Clocks) -> str:
         f"The clocks of the two files differ by {abs(joined.offset_s):.2f} s, by where the speeds driven fit those commanded "
         f"(correlation {joined.correlation:.2f}). A lag of the robot is part of this number: trust no lag and no clock-offset "
         "that is found later, unless you replace it by a time that both clocks saw."
+    )
+
+
+def _lost_commands(table: pd.DataFrame, entries: Entries) -> int:
+    """How many commands of 0 last no longer than a moment, between two that are alike."""
+    pair = next((pair for pair in (COMMANDS, (FORWARD, TURN)) if set(pair) <= set(entries)), ())
+    if not pair or "t_s" not in entries or entries["t_s"].get("unit") == "date":
+        return 0
+    columns = [in_si(table, entries[name], with_unit=True) for name in ("t_s", *pair)]
+    told = pd.DataFrame(dict(zip(("t_s", *COMMANDS), columns, strict=True))).dropna()
+    return count_lost(told.sort_values("t_s", kind="stable", ignore_index=True))
+
+
+def _of_lost_commands(count: int) -> str:
+    return (
+        f"{count} times both commands are 0 for a moment between two that are alike, which no motor follows: "
+        "`lost_commands: held` keeps the command before in force. Leave that line out if the robot was really told so."
     )
 
 
