@@ -260,13 +260,13 @@ class TrialDriver:
 
     def _misplaced(self, void: int) -> str | None:
         pose = self._platform.pose()
+        last = f" (the last drive ended because {self._last_end})" if self._last_end else ""
         if pose is None:
-            last = f" (the last drive ended because {self._last_end})" if self._last_end else ""
             return f"The tracker does not see the robot{last}"
         off_m = float(np.hypot(*(pose[:2] - self.start[:2])))
         if off_m > self._rig.placed_within_m:
-            return f"The robot stands {100 * off_m:.0f} cm from its start"
+            return f"The robot stands {100 * off_m:.0f} cm from its start{last}"
         off_rad = abs(math.remainder(pose[2] - self.start[2], 2.0 * math.pi))
         if off_rad > self._rig.placed_within_rad:
-            return f"The robot is turned by {math.degrees(off_rad):.0f}° from its start"
+            return f"The robot is turned by {math.degrees(off_rad):.0f}° from its start{last}"
         return f"The drive gave no result{f': {self._last_end}' if self._last_end else ''}" if void else None
