@@ -73,6 +73,11 @@ class Agreement:
         self.suspects = False
         """Whether the robot should have been seen to move and was not, for less than what pauses the trial."""
 
+    @property
+    def doubts_wheels(self) -> bool:
+        """Whether the wheels have just told other speeds than were ordered, for the first time."""
+        return self._wheels_off > 0
+
     def ordered(self, t_s: float, left_m_s: float, right_m_s: float) -> None:
         """Speeds of the wheels from now on."""
         self._orders.append((t_s + _REACTS_S, left_m_s, right_m_s))

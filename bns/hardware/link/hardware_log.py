@@ -98,6 +98,7 @@ class HardwareLog:
         """Write a log again that was deleted while it is open; raises an OSError that says so in any case."""
         assert self._path is not None
         data = os.pread(lost, os.fstat(lost).st_size, 0)
+        self._path.parent.mkdir(parents=True, exist_ok=True)
         with self._path.open("xb") as again:
             again.write(data)
             again.flush()

@@ -75,6 +75,9 @@ def firmware(version: int, revision: int) -> Firmware:
 class KheperaIII:
     """Driver. Opening asks for the firmware and the battery and makes sure that the wheels stand still."""
 
+    counts_from_its_start = True
+    """Its counters of the wheels' ways are at zero when it starts."""
+
     def __init__(self, link: Exchange, clock: Clock, journal: HardwareLog, stop_s: float = 5.0) -> None:
         self._link, self._clock, self._journal, self._stop_s = link, clock, journal, stop_s
         self.retries = 0

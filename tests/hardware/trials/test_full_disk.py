@@ -111,12 +111,15 @@ def test_a_log_that_is_full_says_so_and_stays_a_log(tmp_path, full, monkeypatch)
     assert [event["kind"] for event in events(path)] == ["one", "four"]
 
 
-def test_a_log_that_was_deleted_meanwhile_is_written_again_and_ends_the_trial(tmp_path):
-    path = tmp_path / "journal.jsonl"
+@pytest.mark.parametrize("folder", [False, True])
+def test_a_log_that_was_deleted_meanwhile_is_written_again_and_ends_the_trial(tmp_path, folder):
+    path = tmp_path / "trials" / "journal.jsonl"
     log = HardwareLog(path, EmulatedClock(np.inf))
     log.note("one", number=1)
     log.sync()
     path.unlink()
+    if folder:
+        path.parent.rmdir()
     log.note("two", number=2)
     said = r"journal\.jsonl: it was deleted while the trial ran, .* Correct that, then continue with --resume\.$"
     with pytest.raises(TrialFileError, match=said):
