@@ -89,6 +89,7 @@ class TrialDriver:
         self.stops_s: list[float] = []
         self.ends: list[str] = []
         self._last_end = ""
+        self._told = set[str]()
         self.leaps = 0
         """Poses of all drives that the robot cannot have reached."""
         self.marked: int | None = None
@@ -192,6 +193,10 @@ class TrialDriver:
         self._last_end = driven.ended
         if driven.ended:
             self.ends.append(driven.ended)
+        if driven.note and driven.note not in self._told:
+            self._told.add(driven.note)
+            with self.suspended():
+                print(f"{purpose.text}: {driven.note}", file=sys.stderr)
         if driven.leaps:
             self.leaps += driven.leaps
             with self.suspended():

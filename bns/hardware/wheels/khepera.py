@@ -33,8 +33,8 @@ _SILENT_S = 0.5
 """A robot that has answered so lately is no lost link, whatever its last question came to."""
 WHEELBASE_M = 0.0884
 """Between the wheels, published."""
-HIGHEST_UNITS = 43_000
-"""End of the range that the firmware regulates."""
+LOWEST_UNITS, HIGHEST_UNITS = 2_000, 43_000
+"""Ends of the range that the firmware regulates; that of firmware 3 and later is not published."""
 FLAT_V = 6.0
 _SPEEDS = r"e,(-?\d+),(-?\d+)"
 
@@ -90,6 +90,11 @@ class KheperaIII:
             raise HardwareError(
                 f"no Khepera III answers ({error}). Is it switched on, paired (PIN 0000), and the port at {BAUD} baud?"
             ) from error
+
+    @property
+    def least_m_s(self) -> float:
+        """The lowest speed that the firmware regulates; 0: not known."""
+        return LOWEST_UNITS / self.firmware.units_per_m_s if self.firmware.version < 3 else 0.0
 
     def set_speed_m_s(self, left: float, right: float) -> tuple[float, float]:
         """Set the speeds of the wheels' surfaces, m/s; what was really sent, after clipping and rounding."""

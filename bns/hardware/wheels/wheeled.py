@@ -170,7 +170,18 @@ class WheeledPlatform:
         seconds = self._clock.now_s() - began_s
         self._check_restarted(before_m, drive)
         done = (drive.carried() * self._units).astype(np.float32)
-        return Driven(done, drive.poses(), drive.rows(), guard.last, ended, seconds, leaps=drive.leaps.count)
+        leaps, note = drive.leaps.count, self._too_slow(commands[: len(done)] / self._units)
+        return Driven(done, drive.poses(), drive.rows(), guard.last, ended, seconds, leaps=leaps, note=note)
+
+    def _too_slow(self, commands: np.ndarray) -> str:
+        """That there are speeds which the robot does not regulate; nothing if there are none, or if it does not say which."""
+        least_m_s, speeds = float(getattr(self._driver, "least_m_s", 0.0)), np.abs(commands[:, :2])
+        if not ((speeds > 0.0) & (speeds < least_m_s)).any():
+            return ""
+        return (
+            f"some commands are slower than {least_m_s:.3f} m/s, which the robot's firmware does not regulate: its wheels may turn "
+            "at another speed, or not at all"
+        )
 
     def _counted(self) -> np.ndarray | None:
         """Ways of the wheels (2,), m; None of a robot whose counters do not begin at zero when it starts, or of a silent one."""

@@ -90,7 +90,7 @@ def test_two_centimetres_unseen_are_a_frozen_scene_and_a_tenth_of_a_second_at_fu
 
 
 def turns_back(speed_m_s, phase_s, tau_s=0.08, frozen_s=np.inf, orders=4):
-    """A robot that goes to and fro each second, its wheels late, looked at as a drive does: when what is seen pauses the trial."""
+    """A robot that goes to and fro each second, its wheels late, looked at as in a drive: when what is seen pauses it."""
     agreement, y_m, is_m_s, look_s, shown = Agreement(0.5, WHEELBASE_M), 0.0, 0.0, phase_s, START
     for step in range(100 * orders):
         t_s = step / 100
