@@ -179,7 +179,7 @@ class WheeledPlatform:
         if not ((speeds > 0.0) & (speeds < least_m_s)).any():
             return ""
         return (
-            f"some commands are slower than {least_m_s:.3f} m/s, which the robot's firmware does not regulate: its wheels may turn "
+            f"some commands are slower than {least_m_s:.3f} m/s, which the robot's firmware does not regulate: wheels may turn "
             "at another speed, or not at all"
         )
 
