@@ -127,11 +127,11 @@ class KheperaIII:
 
         Nothing is waited for but answers, and for these no longer than this link makes necessary: one that comes later than that
         still counts. Once acknowledged, the order is given again only if the wheels go on turning: what is lost on the way back
-        takes nothing away from it. It is tried for `patience_s`, or as long as the rig says.
+        takes nothing away from it. It is tried for `patience_s`, or as long as the rig says, while the journal's disk lets it.
         """
         began_s, acknowledged_s, ordered_s, still = self._clock.now_s(), None, -math.inf, 0
         turned_s, problem = -math.inf, "one reading of still wheels is none"
-        patience_s = self._stop_s if patience_s is None else patience_s
+        patience_s = (self._stop_s if patience_s is None else patience_s) - self._journal.held_up_s
         while True:
             timeout_s = self._link.times.timeout_s
             try:
@@ -148,7 +148,7 @@ class KheperaIII:
                 problem = "the wheels still turn"
             if still == _READINGS:
                 return self._stopped(Stop(True, lasted_s, acknowledged_s))
-            if lasted_s > patience_s:
+            if lasted_s > patience_s + self._journal.held_up_s:
                 return self._stopped(Stop(False, lasted_s, acknowledged_s, problem))
 
     def _stands(self, timeout_s: float) -> bool:
