@@ -141,6 +141,7 @@ class ServoBus:
                     if in_vain():
                         break
                 else:
+                    self._clock.sleep(_ALL_ANSWER_S)  # the others answer, too: whoever is asked next must not speak over them
                     return False
         except (OSError, TerminalError) as error:
             raise HardwareError(f"the port {self.port} is gone ({error}).") from error

@@ -71,6 +71,8 @@ class WheelDrive:
         self.leaps, self._fastest_m_s, self._apart_m_s = Leaps(), 0.0, 0.0
         self.doubt: Callable[[], None] = lambda: None
         """Called where the wheels tell other speeds than were ordered; what it raises ends the drive."""
+        self.over_s = math.inf
+        """When the last command was over, as the robot was to be stopped."""
         self.told_m = np.zeros(2)
         """How far the wheels have turned by the speeds that the robot told, twice a second."""
 
@@ -129,7 +131,7 @@ class WheelDrive:
 
     def ordered_m(self) -> tuple[np.ndarray, float]:
         """How far the wheels should have turned by now (2,), and how far one can have, in either direction."""
-        ends = [order.t_s for order in self._orders[1:]] + [self._clock.now_s()] * bool(self._orders)
+        ends = [order.t_s for order in self._orders[1:]] + [min(self._clock.now_s(), self.over_s)] * bool(self._orders)
         ways = np.array([[order.left_m_s, order.right_m_s] for order in self._orders]).reshape(-1, 2)
         ways *= np.array([end_s - order.t_s for order, end_s in zip(self._orders, ends, strict=True)])[:, None]
         return ways.sum(axis=0), _SPARE_M + _FASTER * float(np.abs(ways).max(axis=1).sum())

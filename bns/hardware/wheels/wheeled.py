@@ -22,7 +22,8 @@ from bns.hardware.tracking.kinds import delay_of
 from bns.hardware.tracking.sight import Tracker
 from bns.hardware.wheels.wheel_drive import RobotLostError, WheelDrive
 
-_AT_ZERO_M, _TURNED_M = 0.01, 0.05
+_AT_ZERO_M, _TURNED_M, _OFF_SHARE = 0.01, 0.05, 0.05
+"""Counters so near zero have begun again where wheels must be further from there, by more than orders may be off."""
 _RESTARTED = (
     "the robot has restarted during the drive: its counters of the wheels began again at zero. Its battery is low, worn or "
     "loose, or its switch was touched: charge it, see that it sits firmly"
@@ -162,6 +163,8 @@ class WheeledPlatform:
                     ended = str(end)
                 except RobotLostError as error:
                     raise TrialPausedError(f"the robot was lost: {error}") from error
+                finally:
+                    drive.over_s = self._clock.now_s()
         except TrialPausedError as error:
             if self._asked() is None:
                 self._check_restarted(before_m, drive, error)
@@ -198,6 +201,7 @@ class WheeledPlatform:
         if before_m is None or (now_m := self._counted()) is None:
             return
         ordered_m, furthest_m = drive.ordered_m()
-        away = np.minimum(np.abs(before_m + ordered_m), np.abs(before_m + drive.told_m)) > _TURNED_M
+        turned_m = _TURNED_M + _OFF_SHARE * furthest_m
+        away = np.minimum(np.abs(before_m + ordered_m), np.abs(before_m + drive.told_m)) > turned_m
         if np.abs(now_m - before_m).max() > furthest_m or (np.abs(now_m).max() < _AT_ZERO_M and away.any()):
             raise TrialPausedError(_RESTARTED) from error

@@ -31,3 +31,12 @@ def test_a_robot_that_was_away_has_not_restarted(tmp_path, capsys, kind):
     asked = ["trial", "--robot", "khepera", "--emulated", "--yes", "--speed", "inf", "--results", tmp_path, "--commands", drives]
     assert call(*asked, *faults(tmp_path, {"kind": kind, "at_s": 4.0, "for_s": 1.5})) == 3
     assert "the robot was lost" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("back", ["-0.08,-0.08,1", "-0.2,-0.2,0.4", "-0.05,-0.05,1.6"])
+def test_a_robot_that_drives_back_to_where_its_counters_were_at_zero_has_not_restarted(tmp_path, back):
+    """Its speed is asked for in longer commands alone: what it told is no way."""
+    drives = tmp_path / "commands.csv"
+    drives.write_text("trial,left_m_s,right_m_s,duration_s\n" + f"1,0.2,0.2,0.4\n1,{back}\n" * 4)
+    asked = ["trial", "--robot", "khepera", "--emulated", "--yes", "--speed", "inf", "--results", tmp_path, "--commands", drives]
+    assert call(*asked) == 0
