@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -73,6 +74,11 @@ class Agreement:
         self.suspects = False
         """Whether the robot should have been seen to move and was not, for less than what pauses the trial."""
 
+    @property
+    def doubts_wheels(self) -> bool:
+        """Whether the wheels have just told other speeds than were ordered, for the first time."""
+        return self._wheels_off > 0
+
     def ordered(self, t_s: float, left_m_s: float, right_m_s: float) -> None:
         """Speeds of the wheels from now on."""
         self._orders.append((t_s + _REACTS_S, left_m_s, right_m_s))
@@ -135,8 +141,13 @@ class Agreement:
         return found
 
     def _way_m(self, until_s: float) -> float:
-        """Of the faster wheel, so far."""
-        return sum(lasts_s * max(abs(left), abs(right)) for lasts_s, left, right in self._spans(-math.inf, until_s))
+        """Of the faster wheel, so far. While a robot turns back, nobody knows when, it is where it was, and makes none."""
+        way_m = sum(lasts_s * max(abs(left), abs(right)) for lasts_s, left, right in self._spans(-math.inf, until_s))
+        for (since_s, *before), (back_s, *after) in pairwise(self._orders):
+            if before[0] * after[0] + before[1] * after[1] < 0.0:
+                lasts_s = min(back_s, until_s) - max(back_s - _REACTS_S, since_s)
+                way_m -= max(lasts_s, 0.0) * max(abs(speed) for speed in before)
+        return way_m
 
     def _driven(self, begin: _Seen, to_s: float) -> tuple[np.ndarray, float, float]:
         """Where the orders lead from a pose, in arcs; the way of the middle, and how much it turns."""

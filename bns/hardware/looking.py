@@ -38,6 +38,8 @@ def watch(rig: Rig, clock: Clock, seconds: float, folder: Path | None, say: Call
         end_s = clock.now_s() + seconds
         while clock.now_s() < end_s:
             sight = tracker.look()
+            if sight is None and (gone := str(getattr(tracker, "gone", ""))):
+                raise HardwareError(gone)
             looks, seen = looks + 1, seen + (sight is not None)
             say(in_words(sight))
             if folder is not None:

@@ -20,7 +20,8 @@ class Driven:
     columns): as the robot's module has them, tracked, in the world frame, the first at the start, the others at the end of each
     command; rows: measurements, a row a look; ended: why it was over before its end, or nothing; seconds it took; spans_s: when
     each command was under way, of a robot whose commands can be unstable; stuck: what would not move any more, where that ended
-    it; leaps: how many poses were further from those before than the robot can drive, or turned further than it can turn.
+    it; leaps: how many poses were further from those before than the robot can drive, or turned further than it can turn; note:
+    what whoever reads the measurements should know of the commands, told once a session.
     """
 
     commands: np.ndarray
@@ -32,6 +33,7 @@ class Driven:
     spans_s: Sequence[tuple[float, float]] = ()
     stuck: str = ""
     leaps: int = 0
+    note: str = ""
 
 
 class Platform(Protocol):

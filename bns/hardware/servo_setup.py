@@ -18,6 +18,7 @@ from bns.hardware.doctor import Finding, latency_of
 from bns.hardware.link.terminal_error import TerminalError
 from bns.hardware.servos.ax12_table import AX12
 from bns.hardware.servos.dynamixel_port import ClockedPort
+from bns.hardware.servos.packets import BROADCAST, PING, WIRES
 from bns.hardware.servos.servo_chain import narrow
 from bns.hardware.servos.servo_models import TABLES, name_of, table_of
 from bns.hardware.servos.servo_table import BAUD, ServoTable
@@ -34,6 +35,8 @@ _MOST_DELAY = 25
 _EEPROM_S = 0.02
 _ANSWERS_ALL = 2
 _SURE = 3
+_ALL_ANSWER_S = 0.8
+"""So long, by the makers' SDK, after a ping to all the last servo may begin to answer: 3 ms a number, and 16."""
 MUTE = -1
 _MUTE = "answers a ping and nothing else (status return level 0)"
 _NAMES = {"return_delay": "return delay", "status_return": "status return level"}
@@ -112,12 +115,37 @@ class ServoBus:
             if not self._set_to(baud):
                 self.untried.append(baud)
                 continue
+            if numbers is None and protocol == 2 and self._nobody():
+                continue
             packets = self._packets[protocol]
             for number in range(_LAST_ID + 1) if numbers is None else numbers:
                 model, result = self._pinged(packets, number)
                 if result != COMM_RX_TIMEOUT:
                     alone = result == COMM_SUCCESS and not all(self._comes_twice(packets, number, i) for i in range(_SURE))
+                    alone = alone and self._of_one(packets, number, table_of(protocol, model))
                     yield OnTheBus(number, baud, model if alone else 0, protocol)
+
+    def _nobody(self) -> bool:
+        """Whether no byte comes back to pings to all, which in protocol 2 all servos answer, one after the other.
+
+        In protocol 1 they may answer over each other, or not at all, so that each number has to be asked.
+        """
+        ping = WIRES[2].instruction(BROADCAST, PING)
+        try:
+            for _ in range(_SURE):  # one may be lost
+                self._line.clearPort()
+                if self._line.writePort(ping) != len(ping):
+                    return False
+                in_vain = self._clock.in_vain(_ALL_ANSWER_S)
+                while not self._line.readPort(1):
+                    if in_vain():
+                        break
+                else:
+                    self._clock.sleep(_ALL_ANSWER_S)  # the others answer, too: whoever is asked next must not speak over them
+                    return False
+        except (OSError, TerminalError) as error:
+            raise HardwareError(f"the port {self.port} is gone ({error}).") from error
+        return True
 
     def set_id(self, new: int, old: int | None = None, looked: Sequence[Rate] | None = None) -> OnTheBus:
         """Give the servo on the bus a number, and the rate of a chain; HardwareError unless it is alone there (or alone has the
@@ -276,6 +304,17 @@ class ServoBus:
             return self._line.more_comes()
         except (OSError, TerminalError) as error:
             raise HardwareError(f"the port {self.port} is gone ({error}).") from error
+
+    def _of_one(self, packets: PacketHandler, number: int, table: ServoTable | None) -> bool:
+        """Whether what is measured comes back whole: of two servos that answer in lock-step, the rest is the same bit by bit."""
+        if table is None:
+            return True
+        address, size = table.span("present_position", "present_temperature")
+
+        def call() -> tuple[int, int, int]:
+            return 0, *packets.readTxRx(self._line, number, address, size)[1:]
+
+        return any(self._asked(call, attempts=1)[1] in {COMM_SUCCESS, COMM_RX_TIMEOUT} for _ in range(_SURE))
 
     def close(self) -> None:
         """Give the port free."""

@@ -89,6 +89,7 @@ class TrialDriver:
         self.stops_s: list[float] = []
         self.ends: list[str] = []
         self._last_end = ""
+        self._told = set[str]()
         self.leaps = 0
         """Poses of all drives that the robot cannot have reached."""
         self.marked: int | None = None
@@ -192,6 +193,10 @@ class TrialDriver:
         self._last_end = driven.ended
         if driven.ended:
             self.ends.append(driven.ended)
+        if driven.note and driven.note not in self._told:
+            self._told.add(driven.note)
+            with self.suspended():
+                print(f"{purpose.text}: {driven.note}", file=sys.stderr)
         if driven.leaps:
             self.leaps += driven.leaps
             with self.suspended():
@@ -260,13 +265,13 @@ class TrialDriver:
 
     def _misplaced(self, void: int) -> str | None:
         pose = self._platform.pose()
+        last = f" (the last drive ended because {self._last_end})" if self._last_end else ""
         if pose is None:
-            last = f" (the last drive ended because {self._last_end})" if self._last_end else ""
             return f"The tracker does not see the robot{last}"
         off_m = float(np.hypot(*(pose[:2] - self.start[:2])))
         if off_m > self._rig.placed_within_m:
-            return f"The robot stands {100 * off_m:.0f} cm from its start"
+            return f"The robot stands {100 * off_m:.0f} cm from its start{last}"
         off_rad = abs(math.remainder(pose[2] - self.start[2], 2.0 * math.pi))
         if off_rad > self._rig.placed_within_rad:
-            return f"The robot is turned by {math.degrees(off_rad):.0f}° from its start"
+            return f"The robot is turned by {math.degrees(off_rad):.0f}° from its start{last}"
         return f"The drive gave no result{f': {self._last_end}' if self._last_end else ''}" if void else None

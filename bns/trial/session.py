@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
+import time
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -177,7 +178,7 @@ def _driven(
     spec: RunSpec, how: TrialSetup, folder: TrialFolder, past: list[Evaluation], on_evaluation: Progress
 ) -> TrialResult:
     """The loop with the robot as its driver; measurements are written however it ends."""
-    started, robot = datetime.now(UTC), load_robot(spec.robot)
+    started, robot = (datetime.now(UTC), time.perf_counter()), load_robot(spec.robot)
     start = on_floor(robot, robot.start_pose())[0]
     try:
         stuck = stuck_before(folder.journal)
@@ -208,9 +209,10 @@ def _looped(
     how: TrialSetup,
     driver: TrialDriver,
     past: list[Evaluation],
-    started: datetime,
+    started: tuple[datetime, float],
     on_evaluation: Progress,
 ) -> TrialResult:
+    """``started``: the time of day, which may be set meanwhile, and the seconds of a clock that is not."""
     robot = load_robot(spec.robot)
     world = RobotWorld("robot-emulated" if how.emulated else "robot")
     with (
@@ -227,9 +229,9 @@ def _looped(
         result = run(spec, tell, world, background)
     if "evals" not in result.tables:
         raise TrialPausedError(f"all {spec.evaluations} evaluations were skipped: there is no result")
-    wall_s = (datetime.now(UTC) - started).total_seconds()
+    wall_s = time.perf_counter() - started[1]
     shares = background.waited_share, background.worked_share
-    return TrialResult(result, driver.stops_s, driver.ends, *shares, background.rounds, started, wall_s)
+    return TrialResult(result, driver.stops_s, driver.ends, *shares, background.rounds, started[0], wall_s)
 
 
 def _repeated(spec: RunSpec, how: TrialSetup, driver: TrialDriver, folder: TrialFolder, result: TrialResult) -> None:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 
 from bns.hardware.clock import RealClock
 from bns.hardware.servo_setup import PROTOCOLS, Rate, ServoBus, adapter, rates
+from bns.hardware.servos.snake_settings import snake_settings
 
 
 def served(options: argparse.Namespace) -> int:
@@ -59,12 +60,15 @@ def check(bus: ServoBus, options: argparse.Namespace) -> int:
     for finding in adapter(options.port):
         bad += not finding.fine
         print(finding)
-    who = f"{len(there)} answer: {_ranges([servo.number for servo in there])}"
+    numbers, chain = {servo.number for servo in there}, set(snake_settings({}).ids)
+    who = f"{len(there)} answer: {_ranges(numbers)}"
+    if len(numbers) > 1 and numbers < chain:
+        print(f"not there: {_ranges(chain - numbers)} (the shipped rig's snake has {_ranges(chain)})")
     print("no servo answers" if not there else f"{bad} to be fixed; {who}" if bad else f"all fine; {who}")
     return 2 if bad else 0
 
 
-def _ranges(numbers: Sequence[int]) -> str:
+def _ranges(numbers: Iterable[int]) -> str:
     """Ids in words, those in a row together: 1 to 4, 6."""
     runs: list[list[int]] = []
     for number in sorted(set(numbers)):

@@ -29,7 +29,7 @@ KINDS: Mapping[str, str] = {
     "bus-fault": "the robot's inner bus fails: the command is not carried out and nothing answers",
     "late-reply": "the answer comes after the host has given up",
     "hang-up": "the link breaks; the robot drives on",
-    "brown-out": "the robot's processor restarts: wheels stop, silence for a while",
+    "brown-out": "the robot's processor restarts: wheels stop, counters at zero, silence for a while",
     "lost-marker": "the tracker sees no marker",
     "stuck-marker": "the tracker shows an old picture as if it were new",
     "late-tracker": "the tracker's poses are older than their time stamps, by for_s, from at_s on",

@@ -31,6 +31,8 @@ from bns.hardware.link.sealed_lines import Seals, checked_lines
 
 _HELD = 1 << 13
 """Bytes that are kept back before they are written."""
+_HANGS_S = 0.5
+"""A disk that takes so long hangs: a network folder whose server is away, a stick that is full or failing."""
 
 
 class HardwareLog:
@@ -41,6 +43,8 @@ class HardwareLog:
         self._descriptor: int | None = None
         self._held = bytearray()
         self._fault: OSError | None = None
+        self.held_up_s = 0.0
+        """How long the disk has held up whoever notes something, in all: a robot that is stopped meanwhile is not to blame."""
         self.listeners: list[Callable[[str, Mapping[str, Any]], None]] = []
         """Told the kind and content of every event."""
         if path is not None:
@@ -82,6 +86,7 @@ class HardwareLog:
     def _write(self, durably: bool = False) -> None:
         """Write what is held back; a fault is kept."""
         assert self._descriptor is not None
+        began_s = time.monotonic()
         try:
             rest = memoryview(bytes(self._held))
             while rest:
@@ -93,11 +98,14 @@ class HardwareLog:
         except OSError as error:
             self._fault = error
         self._held.clear()
+        took_s = time.monotonic() - began_s
+        self.held_up_s += took_s if took_s > _HANGS_S else 0.0
 
     def _put_back(self, lost: int) -> None:
         """Write a log again that was deleted while it is open; raises an OSError that says so in any case."""
         assert self._path is not None
         data = os.pread(lost, os.fstat(lost).st_size, 0)
+        self._path.parent.mkdir(parents=True, exist_ok=True)
         with self._path.open("xb") as again:
             again.write(data)
             again.flush()

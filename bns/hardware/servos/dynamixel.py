@@ -326,6 +326,7 @@ class DynamixelChain:
         else confirmation.
         """
         began_s, acknowledged_s, off = self._clock.now_s(), None, dict[int, int]()
+        patience_s -= self._journal.held_up_s  # what the journal's disk takes from now on does not count
         self._armed = False
         while True:
             round_s = self._clock.now_s()
@@ -333,7 +334,7 @@ class DynamixelChain:
             left = {number: why for number in self.ids if (why := self._not_still(number, off))}
             now_s = self._clock.now_s()
             acknowledged_s = acknowledged_s or (now_s - began_s if len(off) == len(self.ids) else None)
-            if not left or now_s - began_s > patience_s:
+            if not left or now_s - began_s > patience_s + self._journal.held_up_s:
                 break
             self._clock.sleep(round_s + _BETWEEN_S - now_s)
         stop = Stop(not left, now_s - began_s, acknowledged_s, _in_words(left))

@@ -92,6 +92,8 @@ class StreamCamera:
             raise
         self.stamps = ""
         """Who says when a frame was taken: the camera's driver, or its arrival."""
+        self.gone = ""
+        """What to do about a camera that will give no picture any more; nothing while it may give some."""
         self._frame: Frame | None = None
         self._arrived, self._open = threading.Event(), True
         self._thread = threading.Thread(target=self._read, name="camera", daemon=True)
@@ -117,11 +119,18 @@ class StreamCamera:
         self.stamps = "driver" if 0.0 <= age_s < _OLDEST_S else "arrival"
         return now_s - age_s if self.stamps == "driver" else now_s
 
+    def _lost(self, how: str) -> None:
+        self._frame, self.gone = None, f"the camera {self._source} {how}; bns track shows what it sees"
+
     def _read(self) -> None:
         while self._open:
             good, picture = self._capture.read()
             if not good:  # unplugged: the last frame must not be taken for a new one
-                self._frame = None
+                self._lost("is gone: it was unplugged, or its stream has ended. Connect it again")
+                break
+            if self._frame is not None and picture.shape != self._frame.picture.shape:
+                sizes = (f"{one.shape[1]} x {one.shape[0]}" for one in (self._frame.picture, picture))
+                self._lost("gave pictures of {} pixels, and now gives some of {}. Keep it in one mode".format(*sizes))
                 break
             if self._frame is None or not np.array_equal(picture, self._frame.picture):
                 self._frame = Frame(self._filmed_s(), picture)
@@ -149,6 +158,11 @@ class FrameTracker:
         if frame.t_s != self._last[0]:
             self._last = (frame.t_s, self._find(frame))
         return self._last[1]
+
+    @property
+    def gone(self) -> str:
+        """That the camera will show nothing any more, and what to do about it; else nothing."""
+        return str(getattr(self.camera, "gone", ""))
 
     def close(self) -> None:
         """Let the camera go."""

@@ -135,7 +135,7 @@ class Eye:
     def standing(self, meanwhile: Callable[[], None] = lambda: None) -> Sight | None:
         """Mean of some looks, from now on, at a robot that stands; None if it is not seen often enough.
 
-        `meanwhile` is called after each look; what it raises ends the looking.
+        `meanwhile` is called after each look; what it raises ends the looking. TrialPausedError of a tracker that is `gone`.
         """
         sights: list[Sight] = []
         began_s = self._clock.now_s()
@@ -149,6 +149,8 @@ class Eye:
                 points = {name: np.mean([s.points[name] for s in sights], axis=0) for name in sight.points} if sight else {}
                 return Sight(sights[-1].t_s, np.mean([s.pose for s in sights], axis=0), sights[-1].residual_m, points)
             self._clock.sleep(_BETWEEN_S)
+        if gone := str(getattr(self._tracker, "gone", "")):
+            raise self._failed(HardwareError(gone))
         return None
 
     def moving(self) -> str:

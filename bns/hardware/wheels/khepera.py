@@ -33,8 +33,8 @@ _SILENT_S = 0.5
 """A robot that has answered so lately is no lost link, whatever its last question came to."""
 WHEELBASE_M = 0.0884
 """Between the wheels, published."""
-HIGHEST_UNITS = 43_000
-"""End of the range that the firmware regulates."""
+LOWEST_UNITS, HIGHEST_UNITS = 2_000, 43_000
+"""Ends of the range that the firmware regulates; that of firmware 3 and later is not published."""
 FLAT_V = 6.0
 _SPEEDS = r"e,(-?\d+),(-?\d+)"
 
@@ -75,6 +75,9 @@ def firmware(version: int, revision: int) -> Firmware:
 class KheperaIII:
     """Driver. Opening asks for the firmware and the battery and makes sure that the wheels stand still."""
 
+    counts_from_its_start = True
+    """Its counters of the wheels' ways are at zero when it starts."""
+
     def __init__(self, link: Exchange, clock: Clock, journal: HardwareLog, stop_s: float = 5.0) -> None:
         self._link, self._clock, self._journal, self._stop_s = link, clock, journal, stop_s
         self.retries = 0
@@ -87,6 +90,11 @@ class KheperaIII:
             raise HardwareError(
                 f"no Khepera III answers ({error}). Is it switched on, paired (PIN 0000), and the port at {BAUD} baud?"
             ) from error
+
+    @property
+    def least_m_s(self) -> float:
+        """The lowest speed that the firmware regulates; 0: not known."""
+        return LOWEST_UNITS / self.firmware.units_per_m_s if self.firmware.version < 3 else 0.0
 
     def set_speed_m_s(self, left: float, right: float) -> tuple[float, float]:
         """Set the speeds of the wheels' surfaces, m/s; what was really sent, after clipping and rounding."""
@@ -119,11 +127,11 @@ class KheperaIII:
 
         Nothing is waited for but answers, and for these no longer than this link makes necessary: one that comes later than that
         still counts. Once acknowledged, the order is given again only if the wheels go on turning: what is lost on the way back
-        takes nothing away from it. It is tried for `patience_s`, or as long as the rig says.
+        takes nothing away from it. It is tried for `patience_s`, or as long as the rig says, while the journal's disk lets it.
         """
         began_s, acknowledged_s, ordered_s, still = self._clock.now_s(), None, -math.inf, 0
         turned_s, problem = -math.inf, "one reading of still wheels is none"
-        patience_s = self._stop_s if patience_s is None else patience_s
+        patience_s = (self._stop_s if patience_s is None else patience_s) - self._journal.held_up_s
         while True:
             timeout_s = self._link.times.timeout_s
             try:
@@ -140,7 +148,7 @@ class KheperaIII:
                 problem = "the wheels still turn"
             if still == _READINGS:
                 return self._stopped(Stop(True, lasted_s, acknowledged_s))
-            if lasted_s > patience_s:
+            if lasted_s > patience_s + self._journal.held_up_s:
                 return self._stopped(Stop(False, lasted_s, acknowledged_s, problem))
 
     def _stands(self, timeout_s: float) -> bool:

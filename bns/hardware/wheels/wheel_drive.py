@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -20,6 +21,7 @@ _SAME_S = 1e-4
 """Two times closer than this are one."""
 _FASTER = 1.5
 """So many times the speed of its faster wheel a robot may be seen to have: poses may differ from orders by half of the way."""
+_SPARE_M = 0.2
 
 
 class RobotLostError(Exception):
@@ -67,6 +69,12 @@ class WheelDrive:
         self._ends_s: list[float] = []
         self._seen: list[tuple[float, np.ndarray]] = []
         self.leaps, self._fastest_m_s, self._apart_m_s = Leaps(), 0.0, 0.0
+        self.doubt: Callable[[], None] = lambda: None
+        """Called where the wheels tell other speeds than were ordered; what it raises ends the drive."""
+        self.over_s = math.inf
+        """When the last command was over, as the robot was to be stopped."""
+        self.told_m = np.zeros(2)
+        """How far the wheels have turned by the speeds that the robot told, twice a second."""
 
     def carry_out(self, left_m_s: float, right_m_s: float, duration_s: float) -> None:
         """One command, watched until its time is over; if the robot is not seen just then, it lasts until it is."""
@@ -85,8 +93,12 @@ class WheelDrive:
             slept_s += self._sleep()
             self._look()
             if slept_s > (self._heartbeat_looks - 0.5) * _TICK_S:
+                speeds = self._wheels.speed_m_s()
+                self.told_m += np.array(speeds) * slept_s
                 slept_s = 0.0
-                self._agreement.measured(self._clock.now_s(), *self._wheels.speed_m_s())
+                self._agreement.measured(self._clock.now_s(), *speeds)
+                if self._agreement.doubts_wheels:
+                    self.doubt()
         self._clock.sleep(end_s - self._clock.now_s())
         while self._look() is None:
             self._clock.sleep(_POLL_S)
@@ -116,6 +128,13 @@ class WheelDrive:
                 self.leaps.seen(sight.t_s, sight.pose[:2], _FASTER * self._fastest_m_s, float(sight.pose[2]), fastest_rad_s)
             self._agreement.seen(sight)
         return sight
+
+    def ordered_m(self) -> tuple[np.ndarray, float]:
+        """How far the wheels should have turned by now (2,), and how far one can have, in either direction."""
+        ends = [order.t_s for order in self._orders[1:]] + [min(self._clock.now_s(), self.over_s)] * bool(self._orders)
+        ways = np.array([[order.left_m_s, order.right_m_s] for order in self._orders]).reshape(-1, 2)
+        ways *= np.array([end_s - order.t_s for order, end_s in zip(self._orders, ends, strict=True)])[:, None]
+        return ways.sum(axis=0), _SPARE_M + _FASTER * float(np.abs(ways).max(axis=1).sum())
 
     @property
     def _filmed(self) -> int:

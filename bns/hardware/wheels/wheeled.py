@@ -22,6 +22,12 @@ from bns.hardware.tracking.kinds import delay_of
 from bns.hardware.tracking.sight import Tracker
 from bns.hardware.wheels.wheel_drive import RobotLostError, WheelDrive
 
+_AT_ZERO_M, _TURNED_M, _OFF_SHARE = 0.01, 0.05, 0.05
+"""Counters so near zero have begun again where wheels must be further from there, by more than orders may be off."""
+_RESTARTED = (
+    "the robot has restarted during the drive: its counters of the wheels began again at zero. Its battery is low, worn or "
+    "loose, or its switch was touched: charge it, see that it sits firmly"
+)
 _NOT_SEEN = "the tracker does not see the robot: is it lit, marked and on the surface? Try: bns track"
 
 
@@ -142,20 +148,60 @@ class WheeledPlatform:
         agreement = Agreement(self._disagree_s, self._wheels.wheelbase_m)
         often = self._wheels.heartbeat_looks
         drive = WheelDrive(self._driver, self._eye, self._watch, agreement, self._clock, self._journal, start, often)
-        ended = ""
+        ended, before_m = "", self._counted()
+        drive.doubt = lambda: self._check_restarted(before_m, drive)
         guard = StopsAtTheEnd(self.stop, self._asked)
         began_s = self._clock.now_s()
         self._watch.begin()
-        with guard:
-            try:
-                for command in commands / self._units:
-                    drive.carry_out(*command.tolist())
-                drive.finish()
-            except DriveEnded as end:
-                ended = str(end)
-            except RobotLostError as error:
-                raise TrialPausedError(f"the robot was lost: {error}") from error
+        try:
+            with guard:
+                try:
+                    for command in commands / self._units:
+                        drive.carry_out(*command.tolist())
+                    drive.finish()
+                except DriveEnded as end:
+                    ended = str(end)
+                except RobotLostError as error:
+                    raise TrialPausedError(f"the robot was lost: {error}") from error
+                finally:
+                    drive.over_s = self._clock.now_s()
+        except TrialPausedError as error:
+            if self._asked() is None:
+                self._check_restarted(before_m, drive, error)
+            raise
         assert guard.last is not None
         seconds = self._clock.now_s() - began_s
+        self._check_restarted(before_m, drive)
         done = (drive.carried() * self._units).astype(np.float32)
-        return Driven(done, drive.poses(), drive.rows(), guard.last, ended, seconds, leaps=drive.leaps.count)
+        leaps, note = drive.leaps.count, self._too_slow(commands[: len(done)] / self._units)
+        return Driven(done, drive.poses(), drive.rows(), guard.last, ended, seconds, leaps=leaps, note=note)
+
+    def _too_slow(self, commands: np.ndarray) -> str:
+        """That there are speeds which the robot does not regulate; nothing if there are none, or if it does not say which."""
+        least_m_s, speeds = float(getattr(self._driver, "least_m_s", 0.0)), np.abs(commands[:, :2])
+        if not ((speeds > 0.0) & (speeds < least_m_s)).any():
+            return ""
+        return (
+            f"some commands are slower than {least_m_s:.3f} m/s, which the robot's firmware does not regulate: wheels may turn "
+            "at another speed, or not at all"
+        )
+
+    def _counted(self) -> np.ndarray | None:
+        """Ways of the wheels (2,), m; None of a robot whose counters do not begin at zero when it starts, or of a silent one."""
+        if not getattr(self._driver, "counts_from_its_start", False):
+            return None
+        try:
+            return np.array(self._driver.encoders_m())
+        except RobotLostError:
+            return None
+
+    def _check_restarted(self, before_m: np.ndarray | None, drive: WheelDrive, error: Exception | None = None) -> None:
+        """TrialPausedError if the counters, at ``before_m`` when the drive began, have begun again since: they leapt, or are at
+        zero though the wheels, by their orders and by the speeds that they told, have brought them away from there."""
+        if before_m is None or (now_m := self._counted()) is None:
+            return
+        ordered_m, furthest_m = drive.ordered_m()
+        turned_m = _TURNED_M + _OFF_SHARE * furthest_m
+        away = np.minimum(np.abs(before_m + ordered_m), np.abs(before_m + drive.told_m)) > turned_m
+        if np.abs(now_m - before_m).max() > furthest_m or (np.abs(now_m).max() < _AT_ZERO_M and away.any()):
+            raise TrialPausedError(_RESTARTED) from error

@@ -543,3 +543,19 @@ def test_that_no_servo_answers_is_said_once(chain):
     with pytest.raises(HardwareError, match=r"^none of the 3 servos answers at .*supply.*bns servos scan") as said:
         chain(asked=(7, 8, 9))
     assert "servo 8" not in str(said.value)
+
+
+def test_a_stop_that_a_hanging_disk_held_up_is_confirmed_all_the_same(chain, clock):
+    driver = chain()[0]
+    driver.arm()
+    journal = driver._journal
+    note = journal.note
+
+    def hangs(kind, **what):
+        journal.note = note
+        clock.sleep(20.0)
+        journal.held_up_s += 20.0
+        note(kind, **what)
+
+    journal.note = hangs
+    assert driver.stop().confirmed

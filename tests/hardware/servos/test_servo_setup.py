@@ -70,6 +70,24 @@ def test_a_line_on_which_nothing_is_a_servo_is_said_to_be_none(bus, capsys):
     assert "no answer is one of a servo" not in call(capsys, "scan", "--port", port)[1].out
 
 
+def test_two_servos_of_one_id_that_answer_in_lock_step_are_noticed(bus, capsys, monkeypatch):
+    """Their answers to a ping are the same bit by bit; where their joints are is not."""
+
+    def in_step(self, answers, wire):
+        bits = bytes(np.bitwise_and.reduce([np.frombuffer(answer, np.uint8) for answer in answers])) if answers else b""
+        self._garbled = not wire.seems_whole(bits)
+        return bits
+
+    monkeypatch.setattr(Bus, "_on_the_wire", in_step)
+    servos, port = bus(1, 1, 2)
+    servos[0].put("present_position", 700)
+    monkeypatch.setattr(Servo, "update", lambda _self: None)
+    code, said = call(capsys, "scan", "--port", port)
+    assert code == 2
+    assert "id 1 at 1000000 baud: garbled; more than one servo has this id" in said.out
+    assert "id 2 at 1000000 baud: AX-12" in said.out
+
+
 def test_two_servos_of_one_id_that_answer_one_after_the_other_are_noticed(bus, capsys):
     """A new servo waits half a millisecond with its answer, one that was set up does not."""
     servos, port = bus(1, 1, 2)
@@ -251,7 +269,9 @@ def test_rates_that_the_sdk_does_not_list_are_tried_and_those_of_no_adapter_name
 def test_a_check_says_whom_it_looked_at(bus, capsys):
     """Nobody has told it how many there should be."""
     _, port = bus(1, 2, 4, 6, 7)
-    assert call(capsys, "check", "--port", port)[1].out.splitlines()[-1].endswith("5 answer: ids 1 to 2, 4, 6 to 7")
+    missing, who = call(capsys, "check", "--port", port)[1].out.splitlines()[-2:]
+    assert who.endswith("5 answer: ids 1 to 2, 4, 6 to 7")
+    assert missing == "not there: ids 3, 5, 8 to 12 (the shipped rig's snake has ids 1 to 12)"
 
 
 def test_a_mute_servo_gets_its_number(bus, capsys):

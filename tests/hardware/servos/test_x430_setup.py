@@ -11,8 +11,12 @@ from bns.hardware.emulators.devices.bus import Bus
 from bns.hardware.emulators.devices.servo import Servo
 from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.emulators.faults import Faults
+from bns.hardware.servos.packets import BROADCAST
 from bns.hardware.servos.x430_table import XL430_W250, XM430_W350
 
+MUTE = "answers a ping and nothing else (status return level 0); bns servos check --fix --port PORT corrects it"
+SECOND = b"\xff\xff\xfd\x00"
+"""How packets of protocol 2 begin."""
 SET_UP = {"baud_rate": 3}
 
 
@@ -51,6 +55,26 @@ def test_scan_finds_both_protocols_and_new_servos(bus, capsys):
         "id 1 at 57600 baud: XL430-W250",
     ]
     assert "id 2" not in call(capsys, "scan", "--port", port, "--protocol", 2)[1].out
+
+
+def test_numbers_are_gone_through_only_where_a_ping_to_all_is_answered(bus, capsys, monkeypatch):
+    heard, receive = [], Bus.receive
+
+    def lossy(self, data):
+        heard.append((self.baud(), data))
+        first = len([1 for baud, packet in heard if baud == 57600 and packet.startswith(SECOND)]) == 1
+        return receive(self, b"" if first else data)  # the first of these pings is lost
+
+    monkeypatch.setattr(Bus, "receive", lossy)
+    port = bus(Servo(2, bus.clock, Faults()), Servo(4, bus.clock, Faults(), None, XL430_W250, status_return=0))
+    code, said = call(capsys, "scan", "--port", port)
+    assert code == 2
+    assert said.out.splitlines()[:2] == [
+        "id 2 at 1000000 baud: AX-12",
+        f"id 4 at 57600 baud: {MUTE}",
+    ]
+    asked = [packet[4] for baud, packet in heard if baud == 1000000 and packet.startswith(SECOND)]
+    assert asked == [BROADCAST] * 3
 
 
 def test_a_new_servo_gets_its_id_and_the_rate_of_a_chain(bus, capsys):

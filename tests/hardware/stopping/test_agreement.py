@@ -89,6 +89,40 @@ def test_two_centimetres_unseen_are_a_frozen_scene_and_a_tenth_of_a_second_at_fu
     assert suspected
 
 
+def turns_back(speed_m_s, phase_s, tau_s=0.08, frozen_s=np.inf, orders=4):
+    """A robot that goes to and fro each second, its wheels late, looked at as in a drive: when what is seen pauses it."""
+    agreement, y_m, is_m_s, look_s, shown = Agreement(0.5, WHEELBASE_M), 0.0, 0.0, phase_s, START
+    for step in range(100 * orders):
+        t_s = step / 100
+        if step % 100 == 0:
+            asked_m_s = speed_m_s * (-1) ** (step // 100)
+            agreement.ordered(t_s, asked_m_s, asked_m_s)
+        is_m_s += (asked_m_s - is_m_s) * 0.01 / tau_s
+        y_m += 0.01 * is_m_s
+        if t_s < look_s:
+            continue
+        shown = START + np.array([0.0, y_m, 0.0]) if t_s < frozen_s else shown
+        try:
+            agreement.seen(Sight(t_s, shown))
+        except TrialPausedError:
+            return t_s
+        look_s = t_s + (0.03 if agreement.suspects else 0.1)
+    return np.inf
+
+
+@pytest.mark.parametrize("speed_m_s", [0.05, 0.08, 0.1, 0.12, 0.15, 0.2, 0.3])
+@pytest.mark.parametrize("tau_s", [0.04, 0.08])
+def test_a_robot_that_turns_back_is_where_it_was_and_neither_held_nor_filmed_by_a_camera_that_hangs(speed_m_s, tau_s):
+    assert {turns_back(speed_m_s, phase_s / 100, tau_s) for phase_s in range(10)} == {np.inf}
+
+
+@pytest.mark.parametrize("speed_m_s", [0.05, 0.1, 0.2])
+def test_a_picture_that_stands_still_while_a_robot_turns_back_is_found_as_much_later_as_that_takes(speed_m_s):
+    usual_s = max(turns_back(speed_m_s, phase_s / 100, frozen_s=0.5) - 0.5 for phase_s in range(10))
+    late_s = [turns_back(speed_m_s, phase_s / 100, frozen_s=0.9) - 0.9 for phase_s in range(10)]
+    assert max(late_s) <= usual_s + 0.2 + 0.03
+
+
 def test_a_robot_that_stands_by_order_is_not_suspected():
     agreement = Agreement(0.5, WHEELBASE_M)
     agreement.ordered(0.0, 0.0, 0.0)

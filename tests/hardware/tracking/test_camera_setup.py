@@ -1,6 +1,8 @@
 """A camera made ready: how it takes its pictures, the printed board's scale, the floor from several places."""
 
+import threading
 import time
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -8,14 +10,16 @@ import pytest
 
 from bns.cli.main import main
 from bns.errors import HardwareError
+from bns.hardware import looking
 from bns.hardware.emulators.scene import Patch, Scene, flat
 from bns.hardware.link.hardware_log import HardwareLog, events
 from bns.hardware.tracking.calibration import Board, Calibration, _laid, calibrate, check_scale
-from bns.hardware.tracking.camera import StreamCamera
+from bns.hardware.tracking.camera import FrameTracker, StreamCamera
 from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.floor_pose import Corners, floor_pose
 from bns.hardware.tracking.kinds import open_tracker
 from bns.hardware.tracking.lens import looking_down
+from bns.hardware.tracking.sight import Sight
 
 MATRIX = np.array([[820.0, 0, 642], [0, 820, 358], [0, 0, 1]])
 DISTORTION = np.array([-0.25, 0.08, 0.001, -0.0005, 0.0])
@@ -139,3 +143,31 @@ def test_a_camera_is_set_and_read_back(monkeypatch, tmp_path, clock):
     camera = StreamCamera("0", clock, (1920, 1080), insist=False)
     assert camera.picture["width_px"] == 1280
     camera.close()
+
+
+@pytest.mark.parametrize(
+    ("then", "gone"),
+    [
+        ((False, None), "the camera 0 is gone: it was unplugged"),
+        ((True, np.zeros((600, 800, 3), np.uint8)), "the camera 0 gave pictures of 1280 x 720 pixels, and now gives some of 800"),
+    ],
+)
+def test_a_camera_that_is_unplugged_or_changes_its_size_shows_nothing_more_and_says_why(monkeypatch, clock, then, gone):
+    class Changing(Webcam):
+        def read(self):
+            return super().read() if not changed.is_set() else then
+
+    changed = threading.Event()
+    monkeypatch.setattr(cv2, "VideoCapture", Changing)
+    camera = StreamCamera("0", clock, (1280, 720))
+    tracker = FrameTracker(camera, lambda frame: Sight(frame.t_s, np.zeros(3)))
+    assert tracker.look() is not None
+    assert tracker.gone == ""
+    changed.set()
+    camera._thread.join(timeout=30)
+    assert tracker.look() is None
+    assert tracker.gone.startswith(gone)
+    rig = SimpleNamespace(tracker={"kind": "aruco"})
+    monkeypatch.setattr(looking, "open_tracker", lambda *_: tracker)
+    with pytest.raises(HardwareError, match=r"^the camera 0 "):
+        looking.watch(rig, clock, 1.0, None, lambda _text: None)

@@ -1,8 +1,11 @@
 """A tracker looked through: what it saw before somebody asked does not count, and noise tells a picture from its copy."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from bns.errors import TrialPausedError
 from bns.hardware.link.hardware_log import HardwareLog
 from bns.hardware.tracking.eye import Eye
 from bns.hardware.tracking.sight import Sight
@@ -30,3 +33,12 @@ def test_a_robot_wanders_only_if_no_two_pictures_in_a_row_are_alike(clock, place
     eye = Eye(Looks(clock, *((0.0, (1e-4 * place, 0.0, 0.0)) for place in places)), clock, HardwareLog(None, clock), 0.0)
     assert eye.standing() is not None
     assert eye.wanders == wanders
+
+
+def test_a_camera_that_is_gone_is_not_taken_for_a_robot_out_of_sight(clock):
+    tracker = SimpleNamespace(look=lambda: None, gone="")
+    eye = Eye(tracker, clock, HardwareLog(None, clock), 0.0, kind="aruco")
+    assert eye.standing() is None
+    tracker.gone = "the camera 0 is gone"
+    with pytest.raises(TrialPausedError, match=r"^the aruco tracker: the camera 0 is gone$"):
+        eye.standing()

@@ -5,6 +5,7 @@ import os
 import resource
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import pytest
 from bns.cli.main import main
 from bns.errors import StopNotConfirmedError, TrialFileError
 from bns.hardware.clock import EmulatedClock
+from bns.hardware.link import hardware_log
 from bns.hardware.link.hardware_log import HardwareLog, events
 from bns.hardware.rig import shipped_rig
 from bns.hardware.safety import Stopping
@@ -111,12 +113,15 @@ def test_a_log_that_is_full_says_so_and_stays_a_log(tmp_path, full, monkeypatch)
     assert [event["kind"] for event in events(path)] == ["one", "four"]
 
 
-def test_a_log_that_was_deleted_meanwhile_is_written_again_and_ends_the_trial(tmp_path):
-    path = tmp_path / "journal.jsonl"
+@pytest.mark.parametrize("folder", [False, True])
+def test_a_log_that_was_deleted_meanwhile_is_written_again_and_ends_the_trial(tmp_path, folder):
+    path = tmp_path / "trials" / "journal.jsonl"
     log = HardwareLog(path, EmulatedClock(np.inf))
     log.note("one", number=1)
     log.sync()
     path.unlink()
+    if folder:
+        path.parent.rmdir()
     log.note("two", number=2)
     said = r"journal\.jsonl: it was deleted while the trial ran, .* Correct that, then continue with --resume\.$"
     with pytest.raises(TrialFileError, match=said):
@@ -172,3 +177,40 @@ def test_what_a_trial_ended_with_is_not_hidden_by_its_tables(tmp_path, monkeypat
     assert "cannot write the table" in capsys.readouterr().err
     with pytest.raises(TrialFileError), measurements_however_it_ends(tmp_path / "journal.jsonl", ()):
         pass
+
+
+def test_a_log_says_how_long_its_disk_has_held_up_whoever_noted_something(tmp_path, monkeypatch):
+    now_s, takes_s, written = [0.0], [0.1], os.write
+
+    def write(descriptor, data):
+        now_s[0] += takes_s[0]
+        return written(descriptor, data)
+
+    monkeypatch.setattr(hardware_log, "time", SimpleNamespace(monotonic=lambda: now_s[0], time=lambda: 0.0))
+    monkeypatch.setattr(hardware_log.os, "write", write)
+    with HardwareLog(tmp_path / "journal.jsonl", EmulatedClock(np.inf)) as log:
+        log.note("one")
+        log.sync()
+        assert log.held_up_s == 0.0
+        takes_s[0] = 7.0
+        log.note("two")
+        log.sync()
+        assert log.held_up_s == 7.0
+        takes_s[0] = 0.1
+
+
+def test_a_stop_that_a_hanging_disk_held_up_is_confirmed_all_the_same(bench):
+    """The patience with the robot does not run out meanwhile."""
+    rig = bench()
+    rig.driver.set_speed_m_s(0.1, 0.1)
+    journal = rig.driver._journal
+    note = journal.note
+
+    def hangs(kind, **what):
+        journal.note = note
+        rig.clock.sleep(20.0)
+        journal.held_up_s += 20.0
+        note(kind, **what)
+
+    journal.note = hangs
+    assert rig.driver.stop().confirmed

@@ -27,6 +27,16 @@ def test_given_commands_are_driven_and_measured(tmp_path, capsys):
     assert "already; resume it with --resume, move it away" in capsys.readouterr().err
 
 
+def test_speeds_that_the_firmware_does_not_regulate_are_told_once(tmp_path, capsys):
+    file = tmp_path / "slow.csv"
+    file.write_text("trial,left_m_s,right_m_s,duration_s\n1,0.02,0.02,1\n2,0.0,0.02,1\n3,0.013,0.02,1\n4,0.02,-0.01,1\n")
+    asked = ["trial", "--robot", "khepera", "--emulated", "--yes", "--speed", "inf", "--results", tmp_path]
+    assert call(*asked, "--commands", file) == 0
+    told = [line for line in capsys.readouterr().err.splitlines() if "does not regulate" in line]
+    assert len(told) == 1
+    assert told[0].startswith("evaluation 3: some commands are slower than 0.014 m/s, which the robot's firmware does not")
+
+
 def test_given_commands_are_gone_on_with(tmp_path, capsys):
     file = tmp_path / "proposed.csv"
     file.write_text("trial,left_m_s,right_m_s,duration_s\n" + "".join(f"{n},0.1,0.08,3.0\n" for n in range(1, 5)))

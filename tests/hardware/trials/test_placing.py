@@ -49,3 +49,12 @@ def test_why_the_last_drive_ended_is_said_to_whoever_puts_the_robot_back(clock):
     for number in (1, 2):
         own.evaluate(number, np.ones((1, 3)))
     assert heard == [f"The tracker does not see the robot (the last drive ended because {ended})"]
+
+
+def test_why_the_last_drive_ended_is_said_where_the_robot_stands_elsewhere(clock):
+    turned = np.array([0.0, 0.0, 3.0])
+    own, heard = driver(clock, [FAR, turned, START])
+    own._last_end = "the camera has sent no new picture for 0.27 s"
+    own._ready(1)
+    because = "(the last drive ended because the camera has sent no new picture for 0.27 s)"
+    assert heard == [f"The robot {how} from its start {because}" for how in ("stands 100 cm", "is turned by 172°")]

@@ -10,6 +10,7 @@ import sys
 import tempfile
 import time
 from contextlib import nullcontext
+from datetime import datetime, timedelta
 from functools import cache
 from pathlib import Path
 
@@ -27,9 +28,23 @@ from .. import soak
 from .calls import TRIAL, call, evaluated, faults, journal_of
 
 
-def test_from_command_to_table_and_replay(tmp_path, capsys):
-    assert call(*TRIAL, "--evaluations", 3, "--results", tmp_path) == 0
+class SetBack(datetime):
+    """The time of day, set back by two hours while a trial goes on."""
+
+    asked = 0
+
+    @classmethod
+    def now(cls, tz=None):
+        cls.asked += 1
+        return datetime.now(tz) - timedelta(hours=2 * (cls.asked > 1))
+
+
+def test_from_command_to_table_and_replay(tmp_path, capsys, monkeypatch):
+    with monkeypatch.context() as patched:
+        patched.setattr("bns.trial.session.datetime", SetBack)
+        assert call(*TRIAL, "--evaluations", 3, "--results", tmp_path) == 0
     said = capsys.readouterr().out
+    assert re.search(r", \d+ s by the wall clock", said)
     assert "3 evaluations" in said
     assert "stops: 3 confirmed" in said
     assert "the robot waited for computations" in said

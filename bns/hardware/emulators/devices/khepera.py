@@ -141,6 +141,6 @@ class KheperaEmulator:
 
     def _brown_out(self, now_s: float) -> None:
         if now_s >= self._silent_until_s:
-            self._count_encoders()
+            self._set_encoders([0, 0])
             self.body.order(0.0, 0.0, now_s)
             self._silent_until_s = now_s + self._faults.length_s("brown-out")
