@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,10 @@ FLOOR: dict[str, Any] = {"match_aspect": True, "aspect_scale": 1}
 EAST_NORTH = ("x, east (m)", "y, north (m)")
 _MOST_POINTS = 4000
 """More of a path no screen shows."""
+_TITLE_CHARACTERS = 44
+"""Of a line of a title: what a window of 400 pixels has room for."""
+_UPRIGHT_CHARACTERS = 4
+"""Labels with more stand upright: side by side they would run into each other."""
 
 
 def blank(title: str, x: str, y: str, tools: str = "pan,wheel_zoom,reset", height: int = 300, **more: Any) -> Any:
@@ -28,12 +33,27 @@ def blank(title: str, x: str, y: str, tools: str = "pan,wheel_zoom,reset", heigh
         sizing_mode="stretch_width",
         styles={"max-width": "calc(100vw - 28px)"},  # where what stands beside it is wider than the window
         toolbar_location="above",
+        toolbar_sticky=False,  # in a line of its own: beside a title, its icons lie over it where the window is narrow
         **drag,
         **more,
     )
     made.toolbar.logo = None
-    made.title.text_font_size = "12px"
+    made.title.text_font_size = made.axis.major_label_text_font_size = made.axis.axis_label_text_font_size = "13px"
+    entitle(made, title)
     return made
+
+
+def entitle(figure: Any, title: str) -> None:
+    """A title in as many lines as a narrow window needs: Bokeh cuts what is too long."""
+    lines = [line for part in title.split("; ") for line in textwrap.wrap(part, _TITLE_CHARACTERS)]
+    figure.title.text = "\n".join(lines)
+
+
+def label_ticks(axis: Any, names: dict[float, str]) -> None:
+    """Names in the place of numbers along a horizontal axis."""
+    axis.major_label_overrides = names
+    crowded = max(map(len, names.values()), default=0) > _UPRIGHT_CHARACTERS
+    axis.major_label_orientation = "vertical" if crowded else "horizontal"
 
 
 def legend_above(figure: Any) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from bokeh.events import SelectionGeometry
 from bokeh.models import BoxAnnotation, BoxSelectTool, ColumnDataSource, HoverTool
 
-from bns.app.figures.common import blank, drawable
+from bns.app.figures.common import blank, drawable, entitle
 from bns.diagnose.data.tracks import Array
 from bns.plotting.style import BLUE, GREY, RED
 
@@ -41,7 +41,7 @@ class TimeAxisFigure:
 
     def fill(self, title: str, t_s: Array, pose: Array, odd: Sequence[tuple[float, str]]) -> None:
         """Times (frames,) and poses (frames, 3) of a trial; findings: time and text."""
-        self.figure.title.text = title
+        entitle(self.figure, title)
         away = np.hypot(*(pose[:, :2] - pose[:1, :2]).T) if len(pose) else np.zeros(0)
         shown = drawable(np.column_stack([t_s, away]))
         self._line.data = {"t_s": shown[:, 0], "m": shown[:, 1]}
