@@ -42,6 +42,7 @@ PROBE = """<script>window.addEventListener("load", () => {
   const at = id => document.getElementById(id), told = () => at("now").textContent;
   const broken = [...document.images].filter(image => !image.naturalWidth).length;
   const wide = document.documentElement.scrollWidth > document.documentElement.clientWidth;
+  const cut = [...document.querySelectorAll("section > .cards, .picture, pre")].filter(e => e.scrollWidth > e.clientWidth + 1).length;
   const lost = [...document.querySelectorAll("nav a")].filter(a => !document.querySelector(a.getAttribute("href"))).length;
   const last = told(), bottom = at("verdict").getBoundingClientRect().bottom;
   at("time").value = 0;
@@ -49,7 +50,7 @@ PROBE = """<script>window.addEventListener("load", () => {
   const first = told();
   at("trial").value = 1;
   at("trial").dispatchEvent(new Event("change"));
-  document.title = JSON.stringify({broken, wide, lost, first, last, other: told(), bottom,
+  document.title = JSON.stringify({broken, wide, cut, lost, first, last, other: told(), bottom,
     rows: at("poses").rows.length, lines: at("floor").querySelectorAll("path").length});
 });</script></head>"""
 WORLDS = {
@@ -152,7 +153,7 @@ def test_a_browser_shows_it_without_an_error_and_the_slider_moves(page_of, tmp_p
     done = browse(probed, width, tmp_path / "profile")
     assert "CONSOLE" not in done.stderr
     found = json.loads(html.unescape(re.search(r"<title>(.*?)</title>", done.stdout)[1]))
-    assert (found["broken"], found["wide"], found["lost"]) == (0, False, 0)
+    assert (found["broken"], found["wide"], found["cut"], found["lost"]) == (0, False, 0, 0)
     assert found["first"].startswith("error at 0.0 s: model as given 0 mm")
     assert len({found["first"], found["last"], found["other"]}) == 3
     assert found["rows"] > 3
