@@ -42,7 +42,8 @@ PROBE = """<script>window.addEventListener("load", () => {
   const at = id => document.getElementById(id), told = () => at("now").textContent;
   const broken = [...document.images].filter(image => !image.naturalWidth).length;
   const wide = document.documentElement.scrollWidth > document.documentElement.clientWidth;
-  const cut = [...document.querySelectorAll("section > .cards, .picture, pre")].filter(e => e.scrollWidth > e.clientWidth + 1).length;
+  const whole = [...document.querySelectorAll("section > .cards, .picture, pre")];
+  const cut = whole.filter(e => e.scrollWidth > e.clientWidth + 1).length;
   const lost = [...document.querySelectorAll("nav a")].filter(a => !document.querySelector(a.getAttribute("href"))).length;
   const last = told(), bottom = at("verdict").getBoundingClientRect().bottom;
   at("time").value = 0;
