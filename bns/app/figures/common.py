@@ -17,11 +17,13 @@ _MOST_POINTS = 4000
 """More of a path no screen shows."""
 _TITLE_CHARACTERS = 44
 """Of a line of a title: what a window of 400 pixels has room for."""
+_HEIGHT, _LETTER = 300, 7
+"""Pixels: of a figure, and of a letter of its labels."""
 _UPRIGHT_CHARACTERS = 4
 """Labels with more stand upright: side by side they would run into each other."""
 
 
-def blank(title: str, x: str, y: str, tools: str = "pan,wheel_zoom,reset", height: int = 300, **more: Any) -> Any:
+def blank(title: str, x: str, y: str, tools: str = "pan,wheel_zoom,reset", height: int = _HEIGHT, **more: Any) -> Any:
     """An empty figure that takes the width there is."""
     drag = {"active_drag": "box_select"} if "box_select" in tools else {}
     made = figure(
@@ -49,11 +51,13 @@ def entitle(figure: Any, title: str) -> None:
     figure.title.text = "\n".join(lines)
 
 
-def label_ticks(axis: Any, names: dict[float, str]) -> None:
-    """Names in the place of numbers along a horizontal axis."""
-    axis.major_label_overrides = names
-    crowded = max(map(len, names.values()), default=0) > _UPRIGHT_CHARACTERS
-    axis.major_label_orientation = "vertical" if crowded else "horizontal"
+def label_ticks(figure: Any, names: dict[float, str]) -> None:
+    """Names in the place of numbers along the horizontal axis; long ones take their room from no plot."""
+    longest = max(map(len, names.values()), default=0)
+    upright = longest > _UPRIGHT_CHARACTERS
+    figure.xaxis.major_label_overrides = names
+    figure.xaxis.major_label_orientation = "vertical" if upright else "horizontal"
+    figure.height = _HEIGHT + (_LETTER * longest if upright else 0)
 
 
 def legend_above(figure: Any) -> None:

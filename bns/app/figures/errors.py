@@ -91,7 +91,7 @@ class WindowFigures:
             source.data = {key: getattr(found, key) for key in ("x", "rms", "low", "high")}
         self.along.xaxis.axis_label = label(variable)
         named = dict(zip(columns["number"].tolist(), map(str, columns["trial"]), strict=True))
-        label_ticks(self.trial.xaxis, named)  # as the lists name them, whatever the log counts from
+        label_ticks(self.trial, named)  # as the lists name them, whatever the log counts from
         for span in self._noise:
             span.location = 1e3 * noise_floor_m if np.isfinite(noise_floor_m) else 0
         entitle(self.floor, f"On the floor: area grows with the error{noise_in_words(noise_floor_m)}")

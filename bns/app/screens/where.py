@@ -33,8 +33,8 @@ class WhereScreen:
         self._which = pn.widgets.RadioButtonGroup(**called("Model"), options=[GIVEN, NOW], value=GIVEN)
         self._horizon = pn.widgets.Select(**called("Error how far ahead"), options={ahead("1s"): "1s"}, width=160)
         self._variable = pn.widgets.Select(**called("Along"), options={label("time_in_trial_s"): "time_in_trial_s"}, width=350)
-        self._worst = pn.widgets.Select(**called("Worst moments"), options=[], size=6, width=320)
-        self._trial = pn.widgets.Select(**called("Trial"), options=[], width=160)
+        self._worst = pn.widgets.Select(**called("Worst moments"), options=[], size=6, width=350)
+        self._trial = pn.widgets.Select(**called("Trial"), options=[], width=240)
         self._time = Slider(**called("Time in the trial (s)"), start=0, end=1, step=0.02, **WIDE)
         self._errors, self._explained, self._brushed = html(), html(), html()
         self._shown: Shown | None = None
@@ -111,7 +111,7 @@ class WhereScreen:
         if best and self._to_choose:
             self._to_choose, self._variable.value = False, best[0]
         self._worst.options = {
-            f"trial {w.trial}, from {w.t_s:.2f} s: {1e3 * w.position_m:.1f} mm": (w.trial, w.t_s)
+            f"{1e3 * w.position_m:.1f} mm from {w.t_s:.2f} s of trial {w.trial}": (w.trial, w.t_s)
             for w in comparison.worst
         }
         if comparison.worst:
