@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from analysis.figure_result import FigureResult
 from analysis.labels import counted, task_number, task_title
 from analysis.results import NoDataError, Results
+from analysis.selection import of_newest_files
 from bns.plotting.style import BLUE, GREY, RED, lettered, note, panels, style
 
 NAME = "one-run"
@@ -24,10 +25,10 @@ SHOWN = 30
 
 
 def draw(store: Results) -> list[FigureResult]:
-    runs = store.query("""SELECT DISTINCT robot, task, sweep, seed, run_id, evaluations,
+    runs = store.query(f"""SELECT DISTINCT robot, task, sweep, seed, run_id, evaluations,
         generations_per_evaluation AS generations
         FROM runs SEMI JOIN probes USING (run_id, sweep) SEMI JOIN generations USING (run_id, sweep)
-        WHERE status = 'ok' AND generations_per_evaluation > 0""")
+        WHERE status = 'ok' AND generations_per_evaluation > 0 AND {of_newest_files(store)}""")
     if runs.empty:
         raise NoDataError(
             f"no finished run has generations and probes; run bns sweep {FIRST}, or: bns run --record full"

@@ -9,6 +9,7 @@ from analysis.figure_result import FigureResult
 from analysis.labels import CELL, TITLES, counted, task_title, valued
 from analysis.repeats import mean_path, paths_of, repeats_of
 from analysis.results import NoDataError, Results
+from analysis.selection import of_earlier_files, of_newest_files
 from bns.plotting.style import draw_paths, frame_alike, goal_reach, note, outcome, panels, style
 from bns.robots import load_robot
 from bns.tasks import load_task
@@ -25,11 +26,12 @@ WORLD, SNN = ["x_m", "y_m", "heading_rad"], ["snn_x_m", "snn_y_m", "snn_heading_
 def last_successes(store: Results) -> pd.DataFrame:
     """The evaluation to show of each run that has paths: its last success, or its last.
 
-    A run that several sweeps have counts once, for the first of them.
+    A run that several sweeps have counts once, for the first of them. Of a sweep with several files, those of the newest.
     """
     return store.query(f"""
         WITH with_paths AS (SELECT run_id, coalesce(min(sweep) FILTER (sweep = '{FIRST}'), min(sweep)) AS sweep
-                            FROM paths GROUP BY run_id)
+                            FROM paths SEMI JOIN (SELECT run_id, sweep FROM runs WHERE {of_newest_files(store)})
+                            USING (run_id, sweep) GROUP BY run_id)
         SELECT robot, task, sweep, seed, run_id, {", ".join(CELL)},
                coalesce(max(evaluation) FILTER (success), max(evaluation)) AS evaluation, bool_or(success) AS success,
                coalesce(arg_max(fittest_commands, evaluation) FILTER (success), arg_max(fittest_commands, evaluation)) AS commands
@@ -84,7 +86,7 @@ def _draw_task(store: Results, robot: str, task: str, runs: pd.DataFrame) -> Fig
     legends = (ax.get_legend_handles_labels() for ax in axes[:, 0])
     figure.legend(*max(legends, key=lambda legend: len(legend[1])), loc="outside upper center", ncols=3)
     succeeded, n = int(runs.success.sum()), len(runs)
-    said = coverage(store, sweeps).missing
+    said = (*coverage(store, sweeps).missing, *of_earlier_files(store, robot, sweeps))
     if n > len(shown):
         said = (*said, f"{counted(n - len(shown), 'more run')} of this task not shown")
     note(figure, "; ".join((f"Task {task_title(robot, task)}: {succeeded} of {n} runs visited all goals", *said)) + ".")

@@ -104,7 +104,7 @@ def _selection(store: Results, robot: str, groups: pd.DataFrame, sweeps: Sequenc
     others = groups.drop(chosen.index).to_dict("records")
     left_out = (
         *(text for task, row in drawn.items() for text in _left_out(row, [one for one in others if one["task"] == task])),
-        *_of_earlier_files(store, robot, sweeps),
+        *of_earlier_files(store, robot, sweeps),
     )
     tasks = tuple(sorted(chosen.task, key=lambda task: task_order(robot, task)))
     rows = store.query(f"SELECT DISTINCT sweep FROM {RUNS} WHERE {among('sweep', sweeps)} AND status = 'ok' AND ({setting})")
@@ -135,8 +135,10 @@ def _left_out(drawn: dict[Hashable, Any], others: Sequence[dict[Hashable, Any]])
 def of_newest_files(store: Results) -> str:
     """SQL, of `runs`: the newest file of the sweep describes the run, where its name stands for several files.
 
-    Sweeps that confirm, or compare readings or worlds, grow file by file: theirs all count.
+    Sweeps that confirm, or compare readings or worlds, grow file by file: theirs all count. So does a run that is drawn alone.
     """
+    if store.run is not None:
+        return "true"
     several = store.query("SELECT sweep FROM specs GROUP BY sweep HAVING count(DISTINCT spec_hash) > 1 ORDER BY sweep").sweep
     sweeps = [name for name in several if not name.endswith(CONFIRMING) and not name.startswith((READINGS, WORLDS))]
     earlier = [run for name in sweeps if store.plans[name].asked for run in _not_described(store, name)]
@@ -159,7 +161,8 @@ def _not_described(store: Results, sweep: str) -> list[str]:
     ]
 
 
-def _of_earlier_files(store: Results, robot: str, sweeps: Sequence[str]) -> Iterator[str]:
+def of_earlier_files(store: Results, robot: str, sweeps: Sequence[str]) -> Iterator[str]:
+    """How many finished runs of a robot are left out for an earlier file, a sentence a sweep."""
     rows = store.query(f"""SELECT sweep, count(DISTINCT run_id) AS n FROM runs WHERE status = 'ok' AND {among("robot", [robot])}
         AND {among("sweep", sweeps)} AND NOT ({of_newest_files(store)}) GROUP BY sweep ORDER BY sweep""")
     for row in rows.itertuples():

@@ -201,6 +201,25 @@ def checked(name: str, value: Any) -> Any:
     return value
 
 
+_NONE_DRAWN = "a tournament of none has no winner. The smallest has one controller, drawn at random: any fraction up to 1 / "
+_NOTHING_EVOLVES: Mapping[str, tuple[float, str, str]] = {
+    "population_size": (1, "a whole number of 2 or more", "crossover takes two parents, and a single one would never change"),
+    **dict.fromkeys(
+        ("tournament_size", "real_world_selection_size"),
+        (0.0, "a number above 0, up to 1", f"{_NONE_DRAWN}population_size"),
+    ),
+}
+"""Values up to which nothing evolves, or not as the parameter says; what is allowed; and why. A stored run may have them."""
+
+
+def evolvable(name: str, value: Any) -> Any:
+    """As `checked`, for what is still to be run: SpecError also for a value with which nothing would evolve."""
+    least, allowed, why = _NOTHING_EVOLVES.get(name, (-math.inf, "", ""))
+    if allowed and isinstance(value, numbers.Real) and not isinstance(value, bool) and value <= least:
+        raise SpecError(f"{name} is {_plain(value)!r}; it must be {allowed}: {why}.")
+    return checked(name, value)
+
+
 def _plain(value: Any) -> Any:
     """Numbers of numpy and other libraries as Python's own; all else as it is."""
     if isinstance(value, bool) or not isinstance(value, numbers.Real):

@@ -1,7 +1,7 @@
 """The command line as a user meets it: what it prints, where it writes, how it ends."""
 
 import re
-from argparse import ArgumentTypeError
+from argparse import SUPPRESS, ArgumentTypeError, _SubParsersAction
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 import bns as package
-from bns.cli.main import main
+from bns.cli.main import _parser, main
 from bns.cli.options.option_types import duration, interval
 from bns.cli.values import pose_of
 from bns.errors import BnsError
@@ -186,8 +186,8 @@ def test_a_sweep_in_a_model_file_that_is_missing_or_none_writes_nothing(tmp_path
             ["add", "log.csv", "drag", "--model", "khepera", "--term", "-u*k"],
             r"expected one argument\. A value that begins with \"-\" is written --term=VALUE, without a space\. All options",
         ),
-        (["diagnose"], r"^bns: missing: DATA, --model\. Needed: bns diagnose DATA --model M\. All options: bns diagnose --h"),
-        (["add", "log.csv"], r"Needed: bns add DATA EFFECT --output NEW\.yaml --model M\."),
+        (["diagnose"], r"^bns: missing: LOG, --model\. Needed: bns diagnose LOG --model MODEL\. All options: bns diagnose --h"),
+        (["add", "log.csv"], r"Needed: bns add LOG EFFECT --output NEW\.yaml --model MODEL\."),
     ],
 )
 def test_bad_options_end_with_2(arguments, message, capsys):
@@ -195,6 +195,43 @@ def test_bad_options_end_with_2(arguments, message, capsys):
         main(arguments)
     assert ended.value.code == 2
     assert re.search(message, capsys.readouterr().err)
+
+
+def commands():
+    """The parsers by the names of their commands."""
+    (below,) = (action for action in _parser()._actions if isinstance(action, _SubParsersAction))
+    return below.choices
+
+
+@pytest.mark.parametrize(
+    "option", ["--also", "--model", "--wheelbase", "--more", "--without", "--trust", "--trust-file", "--robot"]
+)
+def test_an_option_is_written_and_means_the_same_in_every_command(option):
+    said = {}
+    for name, command in commands().items():
+        for action in command._actions:
+            if option in action.option_strings and action.help != SUPPRESS and name != "calibrate-body":
+                said.setdefault(action.metavar, set()).add(action.help)
+    (texts,) = said.values()  # one word for one thing
+    if option not in {"--model", "--robot"}:  # these may have a default, and mean a robot of another kind
+        assert len(texts) == 1
+    else:
+        assert option == "--robot" or len({text.partition("; or networks")[0] for text in texts}) == 1
+
+
+def test_every_command_calls_a_log_a_log():
+    named = {a.metavar for command in commands().values() for a in command._actions if a.dest in {"data", "log", "logs"}}
+    assert named == {"LOG"}
+
+
+def test_what_also_meant_before_is_understood_with_a_warning(capsys):
+    for asked in (["compare", "log.csv"], ["add", "log.csv", "motor-lag", "-o", "new.yaml"]):
+        options = _parser().parse_args([*asked, "--model", "khepera", "--also", "mine.py"])
+        assert options.trust_file == ["mine.py"]
+        said = capsys.readouterr().err
+        assert said.startswith(f"bns: warning: bns {asked[0]} … --also mine.py is an old spelling")
+        assert said.endswith("write --trust-file mine.py\n")
+        assert said.count("\n") == 1
 
 
 @pytest.mark.parametrize(("text", "seconds"), [("90", 90), ("90s", 90), ("10m", 600), ("1h30m", 5400), ("0.5h", 1800)])

@@ -2,12 +2,16 @@
 
 import dataclasses
 import json
+import re
 
 import numpy as np
 import pytest
 
+import bns
+from bns.cli.main import main
 from bns.errors import SpecError
-from bns.spec import APPROACH_VERSIONS, FIELDS, RunSpec, checked, parameters_in
+from bns.spec import APPROACH_VERSIONS, FIELDS, RunSpec, checked, evolvable, parameters_in
+from bns.sweep.expand.grid import parse_stored
 
 
 def test_equal_specs_have_equal_names_and_every_field_changes_the_name():
@@ -77,6 +81,34 @@ def test_bad_values_are_named_with_what_is_allowed(name, value, message):
     if name in FIELDS:
         with pytest.raises(SpecError, match=message):
             RunSpec(**{name: value})
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("population_size", 1, r"population_size is 1; it must be a whole number of 2 or more: crossover takes two parents"),
+        ("population_size", 0, r"population_size is 0; it must be a whole number of 2 or more"),
+        ("population_size", np.int64(-3), r"population_size is -3; it must be a whole number of 2 or more"),
+        ("tournament_size", 0, r"tournament_size is 0; it must be a number above 0, up to 1: a tournament of none has no winner"),
+        ("real_world_selection_size", -0.1, r"selection_size is -0\.1; it must be a number above 0, up to 1"),
+        ("population_size", True, r"population_size is True"),
+        ("mutation_rate", -0.1, r"mutation_rate is -0\.1; it must be a number from 0 to 1"),
+    ],
+)
+def test_what_cannot_evolve_is_refused_before_it_is_run(tmp_path, capsys, name, value, message):
+    with pytest.raises(SpecError, match=message):
+        evolvable(name, value)
+    with pytest.raises(SpecError, match=message):
+        bns.run(robot="khepera", **{name: value})
+    if value is not True:
+        (tmp_path / "x.yaml").write_text(f"name: demo\nrobot: khepera\ngrid: {{{name}: [{value}]}}\n")
+        assert main(["sweep", str(tmp_path / "x.yaml"), "--results", str(tmp_path / "r")]) == 2
+        assert re.search(rf"^bns: .*x\.yaml:3: .*{message}", capsys.readouterr().err)
+
+
+def test_a_stored_run_of_one_controller_is_read():
+    assert RunSpec(population_size=1).population_size == 1
+    assert parse_stored("name: demo\nrobot: khepera\nfixed: {population_size: 1}\n", "demo").combos[0]["population_size"] == 1
 
 
 def test_a_population_fits_into_memory():

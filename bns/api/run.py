@@ -23,7 +23,7 @@ from bns.measurements import check_table_name
 from bns.physics.model import Model
 from bns.robots import load_robot
 from bns.robots.simulator import StaticSimulator, check_writable, save_simulator
-from bns.spec import FIELDS, RADII_CM, RunSpec
+from bns.spec import FIELDS, RADII_CM, RunSpec, evolvable
 from bns.sweep.jobs import memory
 from bns.sweep.single_run import check_keepable, keep_run
 from bns.tasks import default_task, load_task
@@ -172,7 +172,7 @@ def run(
     """
     given = {"robot": robot, "task": task or default_task(load_robot(robot).name), "world": _named(world), "seed": seed}
     return run_spec(
-        spec_of(given | dict(parameters)),
+        asked_spec(given | dict(parameters)),
         keep=keep,
         measurements=measurements,
         device=device,
@@ -198,6 +198,14 @@ def spec_of(given: Mapping[str, Any]) -> RunSpec:
         if name not in FIELDS:
             raise SpecError(unknown_name("parameter", name, FIELDS))
     return RunSpec(**given)
+
+
+def asked_spec(given: Mapping[str, Any]) -> RunSpec:
+    """The spec of a run that is still to be carried out; SpecError also for values with which nothing would evolve."""
+    for name, value in given.items():
+        if name in FIELDS:
+            evolvable(name, value)
+    return spec_of(given)
 
 
 def run_spec(

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Unpack, overload
 from bns.api.common.progress import Progress
 from bns.api.common.shown import Shown
 from bns.api.measurements import Measurements
-from bns.api.run import Parameters, Row, RunResult, spec_of, telling
+from bns.api.run import Parameters, Row, RunResult, asked_spec, telling
 from bns.errors import HardwareError, SpecError
 from bns.hardware.emulators.faults import FaultPlan, load_plan
 from bns.hardware.rig import load_rig, shipped_rig
@@ -205,7 +205,7 @@ def trial_spec(robot: str, task: str | None = None, *, record: str = "paths", **
             "record is 'full', but a robot drives no probes and no fittest of a generation; use evals or paths."
         )
     named = task or default_task(load_robot(robot).name)
-    return spec_of({**parameters, "robot": robot, "task": named, "world": "robot", "record": record})
+    return asked_spec({**parameters, "robot": robot, "task": named, "world": "robot", "record": record})
 
 
 def trial_setup(

@@ -17,11 +17,13 @@ from bns.physics.figures import with_unit
 
 _SMALL = re.compile(r"[-+]?[\d.]+e-\d+")
 """A number with a hyphen in it."""
+_MOST_ROWS = 12
+"""A table with more scrolls upwards and downwards by itself; one with fewer is shown whole."""
 BADGE = '<span class="bns-badge">{}</span>'
 
 
 def table(columns: Sequence[str], rows: Sequence[Sequence[Any]], caption: str = "", identifier: str = "") -> str:
-    """A table that scrolls sideways by itself; the first cell of a row is its heading."""
+    """A table that scrolls sideways by itself, a long one upwards as well; the first cell of a row is its heading."""
     head = "".join(f'<th scope="col">{escape(str(c))}</th>' for c in columns)
     body = "".join(
         f'<tr><th scope="row">{escape(str(row[0]))}</th>'
@@ -30,8 +32,9 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[Any]], caption: str = 
         for row in rows
     )
     title = f"<caption>{escape(caption)}</caption>" if caption else ""
+    scrolls = "bns-scroll bns-long" if len(rows) > _MOST_ROWS else "bns-scroll"
     return (
-        f'<div class="bns-scroll" tabindex="0"><table class="bns-table" id="{escape(identifier)}">{title}'
+        f'<div class="{scrolls}" tabindex="0"><table class="bns-table" id="{escape(identifier)}">{title}'
         f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
     )
 

@@ -12,7 +12,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
-from bns.api.common.prepared import are_networks
+from bns.api.common.prepared import are_networks, check_displacements
 from bns.api.compare import CompareResult, compare
 from bns.api.diagnose import DiagnoseResult, diagnose
 from bns.api.measurements import Log, Measurements
@@ -83,7 +83,9 @@ class Tab:
 
         DataError: it cannot be used, and all stays as it was.
         """
-        self.log = self._used = log if isinstance(log, Measurements) else Measurements(log, mapping=mapping)
+        read = log if isinstance(log, Measurements) else Measurements(log, mapping=mapping)
+        check_displacements(read.measured)
+        self.log = self._used = read
         self.data_words = (words,) if isinstance(words, str) else tuple(words)
         self.part, self.mapping = ALL, mapping
         self.files = tuple(files) or tuple(str(path.absolute()) for path in files_of(log))
@@ -93,14 +95,16 @@ class Tab:
     def ask(self, paths: Sequence[Path], words: Sequence[str]) -> None:
         """Open files; where their columns say nothing, keep the question for the page, which has menus for that.
 
-        DataError: they cannot be read at all.
+        DataError: they cannot be read at all, or hold no displacement.
         """
         try:
-            self.open([str(path) for path in paths], words)
+            log = Measurements([str(path) for path in paths])
         except DataError as fault:
             for path in paths:
                 read_table(path)
             self.asked, self.why_no_log = tuple(paths), str(fault)
+        else:
+            self.open(log, words, files=[str(path.absolute()) for path in paths])
 
     def keep(self, files: Mapping[str, bytes]) -> list[Path]:
         """Files of the browser, by their names, written where the tab keeps them."""

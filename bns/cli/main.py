@@ -161,7 +161,7 @@ def _add_single_runs(command: Adder) -> None:
         duration,
     )
     ill = command("doctor", doctor, "check ports, robot, camera and calibration, and say what to fix")
-    ill.add_argument("--robot", metavar="ROBOT", help="which robot the rig must be for (default: the one that it names)")
+    ill.add_argument("--robot", metavar="NAME", help="which robot the rig must be for (default: the one that it names)")
     ill.add_argument(
         "--rig", type=Path, metavar="FILE", help="your set-up (YAML); its robot and tracker are checked, too"
     )

@@ -178,20 +178,36 @@ def add_results(parser: argparse.ArgumentParser, *, once_positional: bool = Fals
         )  # fmt: skip
 
 
-def add_trust(parser: argparse.ArgumentParser, *, also: bool = False) -> None:
-    """``--trust``, and ``also`` ``--also``: which Python files that a model names may run."""
+class OldTrust(argparse.Action):
+    """``--also`` where it once allowed a file, as ``--trust-file`` does today: it works, with a warning."""
+
+    def __call__(self, parser: argparse.ArgumentParser, options: Any, value: Any, name: str | None = None) -> None:
+        """Allow the file."""
+        assert isinstance(parser, Parser)
+        parser.old.append((parser.prog, f"{name} {value}", f"--trust-file {value}"))
+        options.trust_file = [*options.trust_file, value]
+
+
+def add_trust(parser: argparse.ArgumentParser, *, once_also: bool = False) -> None:
+    """Which Python files that a model names may run; ``once_also``: ``--also`` is understood as well, with a warning."""
     parser.add_argument(
-        "--trust", action="store_true", help="run the Python files that a model names (they are programs)"
+        "--trust", action="store_true", help="run all Python files that a model names (they are programs)"
     )
-    if also:
-        parser.add_argument(
-            "--also", action="append", default=[], metavar="FILE.py", help="Python file that the model names and that bns may run"
-        )
+    parser.add_argument(
+        "--trust-file",
+        action="append",
+        default=[],
+        metavar="FILE.py",
+        help="run this Python file if a model names it (may be repeated)",
+    )
+    if once_also:
+        parser.add_argument("--also", action=OldTrust, default=argparse.SUPPRESS, metavar="FILE.py", help=argparse.SUPPRESS)
 
 
 def take_trust(options: argparse.Namespace) -> None:
     """Let those Python files run that the command line names, or all."""
-    named = [name for name in [*getattr(options, "also", []), *getattr(options, "effects", [])] if name.endswith(".py")]
+    given = [word for name in ("trust_file", "also", "effects") for word in getattr(options, name, [])]
+    named = [name for name in given if name.endswith(".py")]
     everything = getattr(options, "trust", False)
     if everything or named:
         from bns.physics.trust import trust, trust_all

@@ -35,8 +35,8 @@ def trusted_effect(path: Path, where: str) -> Effect:
     if _ALL not in _trusted() and str(path.resolve()) not in _trusted():
         raise ModelError(
             f"{where} names the Python file {path}, which is a program and not only numbers. It is not run. If you know what "
-            f"it does, allow it: --also {path}; --trust allows every file that a model names (in Python: {VARIABLE}=all in the "
-            "environment, which workers on other machines need as well). A package with the effect needs neither: "
+            f"it does, allow it: --trust-file {path}; --trust allows every file that a model names (in Python: {VARIABLE}=all in "
+            "the environment, which workers on other machines need as well). A package with the effect needs neither: "
             "docs/extending.md."
         )
     return effect_in_file(path)

@@ -33,6 +33,8 @@ if TYPE_CHECKING:  # a figure of stored results does not wait for the compiler
 
 COLUMN_IN, PAGE_IN = 3.5, 7.2
 """Widths of one column and of a page."""
+NARROW_IN = 3.0
+"""Width of a figure for the screen of a phone."""
 TEXT_PT = 8
 """No text is smaller than this at those widths."""
 OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")

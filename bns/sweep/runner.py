@@ -156,9 +156,9 @@ class _SweepRun:
         if others:
             warnings.warn(
                 f"{self.results} already holds {others} finished runs of a sweep {self._sweep.name!r} that "
-                f"{self._sweep.path} does not describe: they are of an earlier file of that name. Figures that "
-                "compare parameters leave them out from now on, and say so; `bns query`, archives and paths of "
-                "single runs show both. To draw both files, stop and give the sweep another name.",
+                f"{self._sweep.path} does not describe: they are of an earlier file of that name. Figures leave them out from "
+                "now on, and say so; `bns query` and archives have both. To draw both files, stop and give the sweep another "
+                "name.",
                 SweepWarning,
                 stacklevel=4,  # the caller of run_sweep
             )

@@ -86,7 +86,7 @@ def check_not_lost(journal: Path) -> None:
     left = [path for path in (journal.with_name(MEASUREMENTS), journal.with_name(REPEATS)) if path.exists()]
     if not left or journal.exists():
         return
-    compare = f" It can still be compared (bns compare --model M {shlex.quote(str(left[0]))})."
+    compare = f" It can still be compared (bns compare --model MODEL {shlex.quote(str(left[0]))})."
     compared = compare if left[0].name == MEASUREMENTS else ""
     raise HardwareError(
         f"{left[0]} is there, and {journal.name}, from which it was made, is gone: what was measured is in that table alone."

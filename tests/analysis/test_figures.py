@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from store.synthetic import failed, make_store, record
 
-from analysis import budget, paths, scatter, success_by_diversity, success_by_mutation
+from analysis import budget, one_run, paths, scatter, success_by_diversity, success_by_mutation
 from analysis.__main__ import figures
 from analysis.intervals import POOLED, pooled, wilson
 from analysis.results import NoDataError, Results
@@ -255,6 +255,24 @@ def test_runs_of_an_earlier_file_of_the_sweep_are_left_out_and_stated(tmp_path):
     archive(tmp_path, tmp_path / "kept.parquet")
     from_archive = success_by_mutation.draw(Results(tmp_path / "kept.parquet", archived=True))[0]
     assert (from_archive.n, from_archive.missing) == (2, drawn.missing)
+
+
+def test_figures_of_single_runs_leave_out_an_earlier_file_of_the_sweep_too(tmp_path):
+    text = "name: grid\nrobot: khepera\nseeds: 1\nfixed: {{evaluations: 4, task: circle, record: full, mutation_rate: {}}}"
+    tables = ("evals", "paths", "generations", "probes")
+    for rate in (0.1, 0.9):
+        spec = RunSpec(seed=0, evaluations=4, mutation_rate=rate, task="circle", record="full")
+        written(tmp_path, "grid", [record(spec, tables)], sweep_text=text.format(rate), sweep_runs=1)
+    store = Results(tmp_path)
+    (drawn,) = paths.draw(store)
+    assert drawn.n == 1
+    assert "1 run of an earlier file of the name grid left out" in drawn.missing
+    assert paths.last_successes(store).mutation_rate.tolist() == [0.9]
+    assert spec.run_id in one_run.draw(store)[0].shows
+    earlier = RunSpec(seed=0, evaluations=4, mutation_rate=0.1, task="circle", record="full").run_id
+    alone = Results(tmp_path, earlier)  # a run that is asked for by its name is drawn, whatever file it is of
+    assert paths.draw(alone)[0].n == 1
+    assert earlier in one_run.draw(alone)[0].shows
 
 
 def test_files_that_add_to_a_confirmation_all_count(tmp_path):

@@ -67,8 +67,8 @@ def same(command, options, *names):
         assert said[name] == getattr(options, name), name
 
 
-ALWAYS = ("data", "model", "wheelbase", "more", "robot", "without", "also", "trust")
-SEARCHED = (*ALWAYS, "without_effect", "settings")
+ALWAYS = ("data", "model", "wheelbase", "more", "robot", "without", "trust")
+SEARCHED = (*ALWAYS, "also", "without_effect", "settings")
 
 
 def test_every_command_that_follows_a_diagnosis_holds_what_was_given(given, own):
@@ -81,7 +81,8 @@ def test_every_command_that_follows_a_diagnosis_holds_what_was_given(given, own)
     assert asked(add)["effects"] == ["motor-lag", str(own)]  # its name is known to nobody but its file
     assert asked(hint)["model"] == "extended.yaml"
     assert asked(hint)["wheelbase"] is None  # the file has it
-    same(hint, given, "data", "more", "robot", "without", "also", "trust")
+    same(hint, given, "data", "more", "robot", "without", "trust")
+    assert asked(hint)["trust_file"] == asked(add)["trust_file"] == [str(own)]  # the extended model names it
     same(propose, given, *SEARCHED, "minutes", "arena", "speeds", "start")
     assert asked(trial)["robot"] == "khepera"
     driven = asked(again)

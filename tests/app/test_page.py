@@ -168,3 +168,5 @@ def test_everything_can_be_read_on_a_narrow_screen(visit):
         settled(page)
         shown(page, f"narrow-{screen.split()[0].lower()}")
         assert widest(page) <= 400, screen
+        hidden = page.locator(".bns-scroll").evaluate_all("all => Math.max(0, ...all.map(e => e.scrollHeight - e.clientHeight))")
+        assert hidden <= 1, f"{screen}: a table is cut"

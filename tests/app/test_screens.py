@@ -22,7 +22,8 @@ import panel as pn
 from bokeh.document import Document
 
 from bns.app.explore import tabs_of
-from bns.app.html import found_errors
+from bns.app.figures.common import blank, entitle, label_ticks
+from bns.app.html import found_errors, table
 from bns.app.jobs import Jobs
 from bns.app.log.part import Part
 from bns.app.screens.data import DataScreen
@@ -367,3 +368,28 @@ def test_the_error_over_time_has_a_band_and_the_floor_says_the_noise():
     screen._horizon.value = "5s"
     noise = tab.bench.as_given.errors.horizons["5s"].noise_floor_m
     assert f"{1e3 * noise:.2f} mm" in screen._path.figure.title.text
+
+
+def test_titles_have_lines_that_fit_a_narrow_window_below_a_line_of_icons():
+    tab = Tab()
+    tab.open(LOG, "log.csv")
+    screen = entered(WhereScreen, tab)
+    entitle(screen._path.figure, "Trial 2026-03-04-the-morning-on-the-concrete-floor-13; noise of the tracking: 3.11 mm")
+    for picture in (*screen._pictures.all, screen._path.figure):
+        assert not picture.toolbar_sticky  # beside the title, its icons lie over it
+        assert picture.title.text
+        assert max(map(len, picture.title.text.splitlines())) <= 46
+
+
+def test_long_names_of_trials_stand_upright_along_the_axis():
+    picture = blank("", "trial", "")
+    label_ticks(picture, {0: "1", 1: "14"})
+    assert (picture.xaxis[0].major_label_orientation, picture.height) == ("horizontal", 300)
+    label_ticks(picture, {0: "concrete-1", 1: "concrete-2"})
+    assert picture.xaxis[0].major_label_orientation == "vertical"
+    assert picture.height > 350  # the labels take their room from no plot
+
+
+def test_a_short_table_is_shown_whole_and_a_long_one_scrolls():
+    assert "bns-long" not in table(["a", "b"], [["x", 1]] * 12)
+    assert "bns-long" in table(["a", "b"], [["x", 1]] * 13)

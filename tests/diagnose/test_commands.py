@@ -234,7 +234,7 @@ def test_a_table_that_could_not_be_written_is_refused_before_the_run(tmp_path, c
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda t: t.groupby("trial").head(1), "No trial has two tracked poses"),
+        (lambda t: t.groupby("trial").head(1), "m.csv: no trial has two tracked poses"),
         (lambda t: t.assign(x_m=0.1, y_m=0.1, heading_rad=0.0), "hardly moves although it is commanded to"),
         (lambda t: t.assign(robot="snake"), "are of the robot snake, but the model khepera is of khepera"),
     ],
@@ -243,6 +243,20 @@ def test_comparisons_that_make_no_sense_are_refused(tmp_path, change, message, c
     write_measurements(change(measured(NOMINAL, trials=10)), tmp_path / "m.csv")
     assert main(["compare", str(tmp_path / "m.csv"), "--model", "khepera"]) == 2
     assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["compare", "diagnose", "add", "propose", "report", "explore"])
+def test_a_log_of_one_pose_is_refused_by_every_command(tmp_path, monkeypatch, capsys, command):
+    monkeypatch.chdir(tmp_path)
+    if command == "explore":
+        pytest.importorskip("panel", reason="the extra app (Panel) is not installed")
+    write_measurements(measured(NOMINAL, trials=1).head(1), tmp_path / "one.csv")
+    more = {"add": ["motor-lag", "-o", "new.yaml"], "explore": ["--no-browser"]}.get(command, [])
+    assert main([command, "one.csv", *more, "--model", "khepera"]) == 2
+    said = capsys.readouterr().err
+    assert "one.csv: no trial has two tracked poses, and a displacement needs two" in said
+    assert "the log holds 1 trial with 1 tracked pose. Log the pose before and after commands" in said
+    assert not (tmp_path / "new.yaml").exists()
 
 
 @pytest.mark.parametrize(

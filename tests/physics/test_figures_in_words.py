@@ -6,7 +6,7 @@ import bns
 from bns.diagnose.report.text import _number
 from bns.diagnose.residuals.floor_lines import FloorLines
 from bns.physics.effects import effect_named
-from bns.physics.figures import figures, figures_apart, mm
+from bns.physics.figures import decimals, figures, figures_apart, figures_of_interval, mm
 
 WORDS = {
     "backlash-start": (
@@ -54,3 +54,22 @@ def test_a_bare_number_has_no_unit_in_the_summary_of_a_model():
     said = bns.Model("khepera").with_effect("wheelbase", factor=1.1772).with_effect("motor-lag", tau_s=0.1).summary()
     assert "wheelbase: factor = 1.1772 (guess)" in said
     assert "motor-lag: tau_s = 0.1 s (guess)" in said
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high", "count"),
+    [
+        (0.20011, 0.19929, 0.20094, 5),
+        (455_001.592, 455_001.587, 455_001.597, 9),  # to millimetres, 455 km away
+        (-900.0, -900.001, -899.999, 7),
+        (0.0, 0.0, 0.0, 5),
+        (1.0, 0.0, float("inf"), 5),
+    ],
+)
+def test_figures_show_how_far_the_ends_of_an_interval_are_apart(value, low, high, count):
+    assert figures_of_interval(value, low, high) == count
+
+
+@pytest.mark.parametrize(("size", "count"), [(0.0, 0), (250.0, 0), (17.0, 0), (1.7, 1), (0.017, 3), (1e-30, 8)])
+def test_decimals_show_two_figures_of_a_size(size, count):
+    assert decimals(size) == count

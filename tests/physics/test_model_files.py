@@ -48,7 +48,7 @@ def model(term, on="v", values="{k: 0.1}", extra=""):
 
 
 def test_program_of_a_model_does_not_run_unless_it_is_allowed(colleague):
-    hint = r"line 4: .* names the Python file .*e\.py.* not run.*--also .*e\.py; --trust .*BNS_TRUST"
+    hint = r"line 4: .* names the Python file .*e\.py.* not run.*--trust-file .*e\.py; --trust .*BNS_TRUST"
     with pytest.raises(ModelError, match=hint):
         load_model(colleague)
     assert not colleague.with_name("ran").exists()

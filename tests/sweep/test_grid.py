@@ -95,7 +95,7 @@ def test_the_last_seed_there_is_may_be_the_last_of_a_sweep(tmp_path):
 
 ERRORS = {
     "parameter": (
-        "seeds: 2\ngrid:\n  population_size: [1]\n  mutation_rte: [0.1]\n",
+        "seeds: 2\ngrid:\n  population_size: [8]\n  mutation_rte: [0.1]\n",
         6,
         "unknown parameter 'mutation_rte'. Did you mean 'mutation_rate'? Valid: ",
     ),

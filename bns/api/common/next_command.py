@@ -26,6 +26,7 @@ def repeated(
     robot: str | None = None,
     without: Iterable[str] = (),
     also: Iterable[_Path] = (),
+    trust_files: Iterable[_Path] = (),
     without_effects: Iterable[str] = (),
     settings: _Path | None = None,
     trust: bool = False,
@@ -36,18 +37,19 @@ def repeated(
 ) -> dict[str, str]:
     """What further commands repeat, quoted for a shell, by what it is for:
 
-    ``data``; ``model``: the model with all that every command takes; ``shared``: the same without the model;
-    ``search``: as ``model``, with what only diagnose, propose and report take; ``area``, ``limits``: what propose takes in
+    ``data``; ``model``: the model with all that add takes; ``shared``: the same without the model;
+    ``search``: as ``model``, with what diagnose, propose and report take; ``area``, ``limits``: what propose takes in
     addition, ``limits`` with the time and the start; ``effect NAME``: the file of an effect of the user's own. There may be
     ``before`` as well: Python that writes the file ``data`` first.
     """
-    own, further = [fspath(file) for file in also], [fspath(file) for file in more]
-    shared = [*_options("--more", further), *_options("--robot", [robot]), *_options("--without", [*without])]
-    shared += [*_options("--also", own), *(["--trust"] if trust else [])]
+    own, further, named = ([fspath(file) for file in files] for files in (also, more, trust_files))
+    common = [*_options("--more", further), *_options("--robot", [robot]), *_options("--without", [*without])]
+    common += [*_options("--trust-file", named), *(["--trust"] if trust else [])]
+    shared = [*common, *_options("--trust-file", own)]
     thresholds = [None if settings is None else fspath(settings)]
     tried = [*_options("--without-effect", [*without_effects]), *_options("--settings", thresholds)]
-    base = ["--model", fspath(model), *([] if wheelbase_m is None else ["--wheelbase", f"{wheelbase_m:g}"]), *shared]
-    words = {"model": base, "shared": shared, "search": [*base, *tried]}
+    base = ["--model", fspath(model), *([] if wheelbase_m is None else ["--wheelbase", f"{wheelbase_m:g}"])]
+    words = {"model": [*base, *shared], "shared": shared, "search": [*base, *common, *_options("--also", own), *tried]}
     files = {f"effect {name}": shlex.quote(file) for name, file in own_files(own).items()}
     quoted = {key: shlex.join(given) for key, given in words.items()}
     return {"data": shlex.quote(fspath(data)), **quoted, **limits(minutes, arena, start, speeds), **files}

@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from bns.api.common.arguments import named_model
+from bns.api.common.shown import counted
 from bns.api.measurements import Log, Measurements, as_measurements
 from bns.api.model import Given, Model, as_model
 from bns.diagnose.adding import known_to
@@ -88,6 +91,7 @@ def prepared(log: Log, model: Given) -> Prepared:
     robot = with_effects(model)
     read = as_measurements(log)
     measured = read.measured
+    check_displacements(measured)
     check_named_robot(measured.robot, robot)
     if isinstance(robot, JointedModel):
         return _prepared_body(read, robot)
@@ -106,6 +110,17 @@ def prepared(log: Log, model: Given) -> Prepared:
         measured = replace(measured, tracks=predictor.tracks)
     check_same_robot(predictor, robot)
     return Prepared(read, measured, predictor, robot)
+
+
+def check_displacements(measured: Measured) -> None:
+    """DataError for measurements in which no trial has two tracked poses: they show no motion."""
+    poses = np.diff(measured.tracks.first)
+    if not (poses > 1).any():
+        held = f"{counted(len(poses), 'trial')} with {counted(int(poses.sum()), 'tracked pose')}"
+        raise DataError(
+            f"{measured.called}: no trial has two tracked poses, and a displacement needs two; the log holds {held}. Log the "
+            "pose before and after commands; rows of one drive have the same name in the column trial."
+        )
 
 
 def with_effects(model: Given) -> Model:
@@ -168,6 +183,7 @@ def prepared_networks(log: Log, model: Given) -> PreparedNetworks | None:
     if found is None:
         return None
     read = as_measurements(log)
+    check_displacements(read.measured)
     predictor = network_predictor(found[0], read.measured.tracks, found[1])
     return PreparedNetworks(read, predictor, Model(wheelbase_m=1.0, name=_name(model)))
 

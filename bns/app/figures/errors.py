@@ -8,7 +8,7 @@ import numpy as np
 from bokeh.models import ColumnDataSource, FactorRange, HoverTool, Span, Whisker
 
 from bns.app.figures.bands import band
-from bns.app.figures.common import EAST_NORTH, FLOOR, SELECTING, blank
+from bns.app.figures.common import EAST_NORTH, FLOOR, SELECTING, blank, entitle, label_ticks
 from bns.diagnose.data.variables import label
 from bns.diagnose.predict.paired_errors import HorizonErrors
 from bns.plotting.style import BLUE, GREY, OKABE_ITO, RED
@@ -41,7 +41,7 @@ class LadderFigure:
             [v for v in (*values["rms"], *values["high"]) if np.isfinite(v)], default=1.0
         )
         self._noise.location = 1e3 * e.noise_floor_m if np.isfinite(e.noise_floor_m) else 0
-        self.figure.title.text = "Error, 95 % interval; dotted: tracking noise"
+        entitle(self.figure, "Error, 95 % interval; dotted: tracking noise")
 
 
 class WindowFigures:
@@ -53,7 +53,7 @@ class WindowFigures:
         self._noise: list[Span] = []
         self._bands = {name: ColumnDataSource({k: [0.0] for k in ("x", "rms", "low", "high")}) for name in ("t_s", "along")}
         self.time = self._scatter("Over time", "time in the trial (s)", "t_s")
-        self.along = self._scatter("Along a variable", "", "along")
+        self.along = self._scatter("Along the variable that is chosen above", "", "along")
         self.trial = self._scatter("By trial", "trial", "number")
         self.floor = blank("On the floor: area grows with the error", *EAST_NORTH, tools=SELECTING, **FLOOR)
         self._dots(self.floor, "x_m", "y_m", "size")
@@ -90,12 +90,11 @@ class WindowFigures:
             found = band(table[variable if name == "along" else name].to_numpy(float), columns["error_mm"], columns["number"])
             source.data = {key: getattr(found, key) for key in ("x", "rms", "low", "high")}
         self.along.xaxis.axis_label = label(variable)
-        self.along.title.text = f"Along {label(variable)}"
         named = dict(zip(columns["number"].tolist(), map(str, columns["trial"]), strict=True))
-        self.trial.xaxis.major_label_overrides = named  # as the lists name them, whatever the log counts from
+        label_ticks(self.trial, named)  # as the lists name them, whatever the log counts from
         for span in self._noise:
             span.location = 1e3 * noise_floor_m if np.isfinite(noise_floor_m) else 0
-        self.floor.title.text = f"On the floor: area grows with the error{noise_in_words(noise_floor_m)}"
+        entitle(self.floor, f"On the floor: area grows with the error{noise_in_words(noise_floor_m)}")
 
 
 def noise_in_words(noise_floor_m: float) -> str:

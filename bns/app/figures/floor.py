@@ -9,7 +9,7 @@ import numpy as np
 from bokeh.events import SelectionGeometry
 from bokeh.models import ColumnDataSource
 
-from bns.app.figures.common import EAST_NORTH, FLOOR, blank, drawable
+from bns.app.figures.common import EAST_NORTH, FLOOR, blank, drawable, entitle
 from bns.diagnose.data.tracks import Array
 from bns.plotting.style import BLUE, GREY, OKABE_ITO, RED
 
@@ -34,7 +34,7 @@ class GoalFigure:
 
     def fill(self, title: str, goals_m: Array, driven: Array, expected: Array) -> None:
         """Goals (goals, 2) and poses (points, 2 or 3), m."""
-        self.figure.title.text = title
+        entitle(self.figure, title)
         numbers = [str(n + 1) for n in range(len(goals_m))]
         self._goals.data = {"x": goals_m[:, 0], "y": goals_m[:, 1], "text": numbers}
         for source, poses in zip(self._lines, (driven, expected), strict=True):
@@ -106,7 +106,8 @@ class ArenaFigure:
     def trial(self, title: str, t_s: Array, paths: Sequence[Array], names: Sequence[str]) -> None:
         """What each explanation expects of a trial: poses (frames, 3) at the times ``t_s``."""
         colors = [OKABE_ITO[i % len(OKABE_ITO)] for i in range(len(paths))]
-        self.figure.title.text, self.figure.legend.visible = title, bool(paths)
+        entitle(self.figure, title)
+        self.figure.legend.visible = bool(paths)
         self._paths.data = {
             "x": [p[:, 0] for p in paths],
             "y": [p[:, 1] for p in paths],

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from bokeh.models import ColumnDataSource, HoverTool
 
-from bns.app.figures.common import EAST_NORTH, FLOOR, SELECTING, blank, drawable, legend_above
+from bns.app.figures.common import EAST_NORTH, FLOOR, SELECTING, blank, drawable, entitle, legend_above
 from bns.diagnose.data.bodies.cycles import CycleTracks
 from bns.diagnose.data.bodies.joints import JointTracks
 from bns.diagnose.data.tracks import Array, Tracks
@@ -30,7 +30,7 @@ class PathFigure:
         ranges: dict[str, Any] = (
             {} if beside is None else {"x_range": beside.figure.x_range, "y_range": beside.figure.y_range}
         )
-        self.figure: Any = blank(title, EAST_NORTH[0], EAST_NORTH[1], **ranges, **FLOOR)
+        self.figure: Any = blank(title, EAST_NORTH[0], EAST_NORTH[1], height=340, **ranges, **FLOOR)
         self._lines = [ColumnDataSource({"x": [0.0], "y": [0.0]}) for _ in range(2)]
         self._dots = ColumnDataSource({"x": [], "y": [], "color": []})
         self._times, self._poses = np.zeros(0), (np.zeros((0, 3)), np.zeros((0, 3)))
@@ -45,7 +45,7 @@ class PathFigure:
 
     def fill(self, title: str, t_s: Array, measured: Array, predicted: Array) -> None:
         """Poses (frames, 3) of both at the times ``t_s`` (frames,)."""
-        self.figure.title.text = title
+        entitle(self.figure, title)
         for source, poses in zip(self._lines, (measured, predicted), strict=True):
             shown = drawable(poses)
             if not (np.array_equal(source.data["x"], shown[:, 0]) and np.array_equal(source.data["y"], shown[:, 1])):
@@ -132,7 +132,7 @@ class LogFigure:
         Of more paths than can be told apart every so-many-th is drawn, which the title says.
         """
         every = max(1, -(-len(paths) * _LEAST_OF_A_PATH // _MOST_OF_ALL))
-        self.figure.title.text = self._title + (f"; one of {every} paths is drawn" if every > 1 else "")
+        entitle(self.figure, self._title + (f"; one of {every} paths is drawn" if every > 1 else ""))
         paths = paths[::every]
         most = max(_LEAST_OF_A_PATH, _MOST_OF_ALL // max(len(paths), 1))
         thin = [p[:: max(1, -(-len(p) // most))] for _, _, p in paths]

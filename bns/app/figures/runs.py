@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from bokeh.models import ColumnDataSource, CustomJS, FixedTicker, HoverTool
 
-from bns.app.figures.common import blank, legend_above
+from bns.app.figures.common import blank, entitle, legend_above
 from bns.plotting.style import BLUE, GREY, OKABE_ITO, RED
 
 SUCCEEDED, FAILED = OKABE_ITO[2], RED
@@ -71,7 +71,7 @@ class RunsFigure:
         }
         self.figure.xaxis.axis_label, self.figure.yaxis.axis_label = x[1], y[1]
         drawn = f", {len(shown)} of them drawn" if len(shown) < len(rows) else ""
-        self.figure.title.text = f"{len(rows)} runs{drawn}, one dot per run"
+        entitle(self.figure, f"{len(rows)} runs{drawn}, one dot per run")
 
 
 class ParallelFigure:
@@ -114,7 +114,7 @@ class ParallelFigure:
         self.figure.xaxis.ticker = FixedTicker(ticks=places)
         self.figure.xaxis.major_label_overrides = dict(enumerate(axes.values()))
         drawn = f"{len(shown)} of {len(rows)} runs drawn" if len(shown) < len(rows) else f"{len(rows)} runs"
-        self.figure.title.text = f"{drawn}, one line per run"
+        entitle(self.figure, f"{drawn}, one line per run")
 
 
 def _heights(column: pd.Series) -> tuple[np.ndarray, tuple[str, str]]:
@@ -169,4 +169,4 @@ class CurveFigure:
     def name(self, words: str) -> None:
         """What is drawn."""
         self.figure.yaxis.axis_label = words
-        self.figure.title.text = f"{words} of the fittest"
+        entitle(self.figure, f"{words} of the fittest")

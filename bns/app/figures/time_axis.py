@@ -9,7 +9,7 @@ import numpy as np
 from bokeh.events import SelectionGeometry
 from bokeh.models import BoxAnnotation, BoxSelectTool, ColumnDataSource, HoverTool
 
-from bns.app.figures.common import blank, drawable
+from bns.app.figures.common import blank, drawable, entitle
 from bns.diagnose.data.tracks import Array
 from bns.plotting.style import BLUE, GREY, RED
 
@@ -22,7 +22,7 @@ class TimeAxisFigure:
 
     def __init__(self, brushed: Callable[[Stretch], None]) -> None:
         self.figure: Any = blank(
-            "", "time in the trial (s)", "distance from its first pose (m)", tools="xpan,xwheel_zoom,reset", height=220
+            "", "time in the trial (s)", "distance (m)", tools="xpan,xwheel_zoom,reset", height=220
         )
         brush = BoxSelectTool(dimensions="width")
         self.figure.add_tools(brush)
@@ -41,7 +41,7 @@ class TimeAxisFigure:
 
     def fill(self, title: str, t_s: Array, pose: Array, odd: Sequence[tuple[float, str]]) -> None:
         """Times (frames,) and poses (frames, 3) of a trial; findings: time and text."""
-        self.figure.title.text = title
+        entitle(self.figure, f"{title}; distance from its first pose")
         away = np.hypot(*(pose[:, :2] - pose[:1, :2]).T) if len(pose) else np.zeros(0)
         shown = drawable(np.column_stack([t_s, away]))
         self._line.data = {"t_s": shown[:, 0], "m": shown[:, 1]}

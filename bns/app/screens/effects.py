@@ -52,7 +52,7 @@ class EffectsScreen:
         self._before = PathFigure("as given")
         self._after = PathFigure("now", self._before)
         self._horizon = pn.widgets.Select(**called("Error how far ahead"), options={ahead("1s"): "1s"}, width=160)
-        self._trial = pn.widgets.Select(**called("Trial"), options=[], width=160)
+        self._trial = pn.widgets.Select(**called("Trial"), options=[], width=240)
         self._time = Slider(**called("Time in the trial (s)"), start=0, end=1, step=0.02, **WIDE)
         self._diagnosis = DiagnosisPart(tab, jobs, self._learned, self._switch_to)
         self._snapshots = SnapshotsPart(tab, jobs, self._go_to, lambda: str(self._horizon.value))

@@ -8,6 +8,7 @@ import pandas as pd
 import panel as pn
 
 from bns.api.compare import CompareResult
+from bns.app.figures.common import entitle
 from bns.app.figures.errors import WindowFigures, noise_in_words
 from bns.app.figures.paths import PathFigure
 from bns.app.html import mm, note, table
@@ -31,9 +32,9 @@ class WhereScreen:
         self._problem, self._pictures, self._path = Problem(), WindowFigures(), PathFigure("path")
         self._which = pn.widgets.RadioButtonGroup(**called("Model"), options=[GIVEN, NOW], value=GIVEN)
         self._horizon = pn.widgets.Select(**called("Error how far ahead"), options={ahead("1s"): "1s"}, width=160)
-        self._variable = pn.widgets.Select(**called("Along"), options={label("time_in_trial_s"): "time_in_trial_s"}, width=260)
-        self._worst = pn.widgets.Select(**called("Worst moments"), options=[], size=6, width=320)
-        self._trial = pn.widgets.Select(**called("Trial"), options=[], width=160)
+        self._variable = pn.widgets.Select(**called("Along"), options={label("time_in_trial_s"): "time_in_trial_s"}, width=350)
+        self._worst = pn.widgets.Select(**called("Worst moments"), options=[], size=6, width=350)
+        self._trial = pn.widgets.Select(**called("Trial"), options=[], width=240)
         self._time = Slider(**called("Time in the trial (s)"), start=0, end=1, step=0.02, **WIDE)
         self._errors, self._explained, self._brushed = html(), html(), html()
         self._shown: Shown | None = None
@@ -110,7 +111,7 @@ class WhereScreen:
         if best and self._to_choose:
             self._to_choose, self._variable.value = False, best[0]
         self._worst.options = {
-            f"trial {w.trial}, from {w.t_s:.2f} s: {1e3 * w.position_m:.1f} mm": (w.trial, w.t_s)
+            f"{1e3 * w.position_m:.1f} mm from {w.t_s:.2f} s of trial {w.trial}": (w.trial, w.t_s)
             for w in comparison.worst
         }
         if comparison.worst:
@@ -124,7 +125,7 @@ class WhereScreen:
         floor = self._shown.errors.horizons[self._horizon.value].noise_floor_m
         self._pictures.fill(self._windows, self._variable.value, floor)
         if self._trial.value is not None:
-            self._path.figure.title.text = self._path_title()
+            entitle(self._path.figure, self._path_title())
         self._rows = []
         self._say_brushed([])
 

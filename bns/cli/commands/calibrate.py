@@ -17,7 +17,7 @@ def add_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
         metavar="FILE",
         help="start values of the parameters (default: those of the package)",
     )
-    fitting.add_argument("--seed", type=int, default=0, help="seed of the random cycles (default: 0)")
+    fitting.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the random cycles (default: 0)")
     fitting.add_argument("--jobs", type=int, metavar="N", help="processes that simulate drives (default: one per core)")
     fitting.add_argument("-o", "--output", type=Path, metavar="FILE", help="file to write: the fitted parameters")
 

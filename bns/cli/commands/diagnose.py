@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from bns.cli.options.measuring_options import (
     add_effect_options,
     add_fresh,
+    add_log,
     add_model_options,
     beside_of,
     log_of,
@@ -36,7 +37,7 @@ def add_commands(command: Adder) -> None:
         type=str,
         action="append",
         default=[],
-        metavar="M",
+        metavar="MODEL",
         help="a further model: its error on the same windows, and the change with its 95 %% interval (may be repeated)",
     )
     found = command(
@@ -44,7 +45,7 @@ def add_commands(command: Adder) -> None:
     )
     more = command("add", add, "add effects to a model, fit them to measurements, and show the error before and after")
     more.rewrite = data_first
-    more.add_argument("data", type=Path, metavar="DATA", help="log: .csv, .parquet, or any file with a mapping")
+    add_log(more)
     more.add_argument(
         "effects",
         nargs="+",
@@ -67,11 +68,10 @@ def add_commands(command: Adder) -> None:
     more.add_argument("-o", "--output", type=Path, required=True, metavar="NEW.yaml", help="file to write: the extended model")
     more.add_argument("--json", action="store_true", help="print one JSON object")
     for one in (held, found):
-        one.add_argument("data", type=Path, metavar="DATA", help="log: .csv, .parquet, or any file with a mapping")
+        add_log(one)
         one.add_argument("--json", action="store_true", help="print one JSON object")
-        one.add_argument("--findings", action="store_true", help="list all irregularities in the data, not only five")
     for one in (held, found, more):
-        add_model_options(one)
+        add_model_options(one, networks=one is held)
         one.add_argument("--figures", type=folder, metavar="DIR", help="also write figures into this folder")
     add_effect_options(found)
     add_fresh(held)
@@ -79,7 +79,7 @@ def add_commands(command: Adder) -> None:
         "-o", "--output", type=Path, metavar="NEW.yaml", help="also write the model with all effects and terms that were found"
     )
     for one in (held, more):
-        add_trust(one, also=True)
+        add_trust(one, once_also=True)
 
 
 def compare(options: argparse.Namespace) -> int:

@@ -6,8 +6,8 @@ import argparse
 import logging
 from pathlib import Path
 
-from bns.cli.options.measuring_options import model_of
-from bns.cli.parser import Adder
+from bns.cli.options.measuring_options import add_model, model_of
+from bns.cli.parser import Adder, add_trust
 
 LARGEST_PORT = 65_535
 
@@ -19,23 +19,14 @@ def add_commands(command: Adder) -> None:
         "data",
         type=Path,
         nargs="*",
-        metavar="DATA",
-        help="measurements, a saved session, or a folder of results (default: the page offers sample logs)",
+        metavar="LOG",
+        help="measurements: .csv, .parquet, or any file with a mapping; or a saved session, or a folder of results (default: "
+        "the page offers sample logs)",
     )
-    page.add_argument(
-        "--model",
-        default="khepera",
-        metavar="M",
-        help="khepera (default), differential-drive, snake, a YAML file, snake-networks, or the networks of a run",
-    )
-    page.add_argument(
-        "--wheelbase",
-        type=float,
-        metavar="METRES",
-        help="distance between the wheels: needed for differential-drive, in place of its own for any other drive",
-    )
+    add_model(page, networks=True, default="khepera")
     page.add_argument("--port", type=_port, default=0, metavar="N", help="port on 127.0.0.1 (default: a free one)")
     page.add_argument("--no-browser", action="store_true", help="print the address without opening a browser")
+    add_trust(page)
 
 
 def explore(options: argparse.Namespace) -> int:

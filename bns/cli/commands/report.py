@@ -9,7 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from bns.cli.commands.diagnose import diagnosed
-from bns.cli.options.measuring_options import MINUTES, add_effect_options, add_model_options, refuse_sources, words_of
+from bns.cli.options.measuring_options import (
+    MINUTES,
+    add_effect_options,
+    add_log,
+    add_model_options,
+    refuse_sources,
+    words_of,
+)
 from bns.cli.parser import Adder
 from bns.cli.progress_bar import ticking
 
@@ -35,7 +42,7 @@ def add_commands(command: Adder) -> None:
         help="file to write (default: report.html)",
     )
     for one in (next_one, page):
-        one.add_argument("data", type=Path, metavar="DATA", help="log: .csv, .parquet, or any file with a mapping")
+        add_log(one)
         add_experiment_options(one)
         add_model_options(one)
         add_effect_options(one)
@@ -63,7 +70,7 @@ def add_experiment_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--speeds",
         metavar="LOW,HIGH",
-        help="lowest and highest wheel speed in m/s (default: the robot's bounds and the speeds in the data)",
+        help="lowest and highest wheel speed in m/s (default: the robot's bounds and the speeds in the log)",
     )
 
 

@@ -15,12 +15,12 @@ def add_commands(command: Adder) -> None:
     planned = command(
         "validate", validate, "evolve controllers on the static simulator and drive each three times in the physics world"
     )
-    planned.add_argument("--robot", default="snake")
-    planned.add_argument("--task", help="goal task (default: the last task of that robot's study)")
+    planned.add_argument("--robot", default="snake", metavar="NAME", help="robot to validate (default: snake)")
+    planned.add_argument("--task", metavar="NAME", help="goal task (default: the last task of that robot's study)")
     planned.add_argument("--sets", type=positive, default=1, metavar="N", help="sets of twelve controllers (default: 1)")
     add_results(planned)
     ready = command("precompute", precompute, "train the static simulator of a robot and write it to a file")
-    ready.add_argument("--robot", default="khepera")
+    ready.add_argument("--robot", default="khepera", metavar="NAME", help="robot of the simulator (default: khepera)")
     ready.add_argument("-o", "--output", type=Path, metavar="FILE", help="file to write (default: inside the package)")
     ready.add_argument("--jobs", type=positive, metavar="N", help="processes that simulate drives (default: one per core)")
 

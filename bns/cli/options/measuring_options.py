@@ -17,14 +17,21 @@ MINUTES = 10.0
 """Of driving, which an experiment takes where nothing else is asked for."""
 
 
-def add_model_options(parser: argparse.ArgumentParser) -> None:
-    """Which model, and which robot of the data."""
+def add_log(parser: argparse.ArgumentParser) -> None:
+    """The log of a command that takes one."""
+    parser.add_argument("data", type=Path, metavar="LOG", help="measurements: .csv, .parquet, or any file with a mapping")
+
+
+def add_model(parser: argparse.ArgumentParser, *, networks: bool = False, default: str | None = None) -> None:
+    """Which model; ``networks``: those of a run as well."""
+    of_runs = "; or networks: .safetensors, snake-networks, snake+changes" if networks else ""
     parser.add_argument(
         "--model",
-        required=True,
-        metavar="M",
-        help="khepera, differential-drive, snake, a YAML file or an MJCF file (.xml); compare also takes networks (.safetensors, "
-        "snake-networks, snake+changes)",
+        required=default is None,
+        default=default,
+        metavar="MODEL",
+        help="khepera, differential-drive, snake, a model file (.yaml) or an MJCF file (.xml)"
+        f"{of_runs}{'' if default is None else f' (default: {default})'}",
     )
     parser.add_argument(
         "--wheelbase",
@@ -32,14 +39,19 @@ def add_model_options(parser: argparse.ArgumentParser) -> None:
         metavar="METRES",
         help="distance between the wheels: needed for differential-drive, in place of its own for any other drive",
     )
-    parser.add_argument("--robot", metavar="NAME", help="robot to use, if the column 'robot' of the data names several")
+
+
+def add_model_options(parser: argparse.ArgumentParser, *, networks: bool = False) -> None:
+    """Which model, and which part of the log."""
+    add_model(parser, networks=networks)
+    parser.add_argument("--robot", metavar="NAME", help="robot to use, if the column 'robot' of the log names several")
     parser.add_argument(
         "--more",
         action="append",
         default=[],
         type=Path,
-        metavar="FILE",
-        help="further measurements to use together with these (may be repeated)",
+        metavar="LOG",
+        help="further log to use together with the first (may be repeated)",
     )
     parser.add_argument(
         "--without",
@@ -48,6 +60,7 @@ def add_model_options(parser: argparse.ArgumentParser) -> None:
         metavar="TRIAL",
         help="name of a trial to exclude (may be repeated)",
     )
+    parser.add_argument("--findings", action="store_true", help="list all irregularities in the log, not only five")
 
 
 def add_fresh(parser: argparse.ArgumentParser) -> None:
@@ -109,7 +122,7 @@ def log_of(options: argparse.Namespace) -> Measurements:
     log = Measurements(options.data, *options.more, robot=options.robot).without(options.without)
     findings = log.measured.findings
     if findings:
-        most = len(findings) if getattr(options, "findings", False) else 5
+        most = len(findings) if options.findings else 5
         print(findings_text(findings, most), file=sys.stderr)
     return log
 
@@ -135,6 +148,7 @@ def words_of(options: argparse.Namespace) -> dict[str, str]:
         robot=options.robot,
         without=options.without,
         also=options.also,
+        trust_files=options.trust_file,
         without_effects=options.without_effect,
         settings=options.settings,
         trust=options.trust,

@@ -11,7 +11,7 @@ from decimal import Decimal
 from pathlib import Path
 
 from bns.errors import SpecError
-from bns.spec import FIELDS, checked, field_type
+from bns.spec import FIELDS, evolvable, field_type
 
 
 def positive(text: str) -> int:
@@ -70,7 +70,7 @@ def _of_parameter(name: str) -> Callable[[str], object]:
         except ValueError:
             value = text
         try:
-            return checked(name, value)
+            return evolvable(name, value)
         except SpecError as error:
             raise argparse.ArgumentTypeError(str(error)) from error
 

@@ -86,7 +86,9 @@ def add_looking_options(
             f"--{name}", type=int, nargs=2, metavar=("LOW", "HIGH"), help="hues to try with --colours, 0 to 179"
         )
     calibrating.add_argument("--rig", type=Path, metavar="FILE", help="your set-up (YAML), for --wii, --delay and --colours")
-    calibrating.add_argument("--robot", help="robot, for --delay and --colours (default: that of --rig, or khepera)")
+    calibrating.add_argument(
+        "--robot", metavar="NAME", help="robot, for --delay and --colours (default: that of --rig, or khepera)"
+    )
     calibrating.add_argument("--emulated", action="store_true", help="use the emulated rig, with --delay or --colours")
     calibrating.add_argument(
         "--floor",
@@ -108,10 +110,14 @@ def add_looking_options(
             metavar="N",
             help="fixed value, in units of the camera's driver (v4l2-ctl -L lists the range)",
         )
-    calibrating.add_argument("--square-mm", type=float, default=68.0, help="side of a printed square in mm (default: 68, for A3)")
-    calibrating.add_argument("--views", type=positive, default=15, help="number of views to take (default: 15)")
-    calibrating.add_argument("-o", "--output", type=Path, default=Path("camera.json"), metavar="FILE")
-    tracking.add_argument("--robot", help="robot (default: that of --rig, or khepera)")
+    calibrating.add_argument(
+        "--square-mm", type=float, default=68.0, metavar="MM", help="side of a printed square in mm (default: 68, for A3)"
+    )
+    calibrating.add_argument("--views", type=positive, default=15, metavar="N", help="number of views to take (default: 15)")
+    calibrating.add_argument(
+        "-o", "--output", type=Path, default=Path("camera.json"), metavar="FILE", help="file to write (default: camera.json)"
+    )
+    tracking.add_argument("--robot", metavar="NAME", help="robot (default: that of --rig, or khepera)")
     tracking.add_argument("--rig", type=Path, metavar="FILE", help="your set-up (YAML)")
     tracking.add_argument("--emulated", action="store_true", help="use the emulated rig")
     tracking.add_argument(

@@ -18,25 +18,31 @@ from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.predict.paired_errors import PairedErrors
 from bns.diagnose.report.text import ahead
 from bns.diagnose.settings import DEFAULTS
-from bns.plotting.style import GREY, OKABE_ITO, PAGE_IN, save, style
+from bns.plotting.style import GREY, NARROW_IN, OKABE_ITO, PAGE_IN, save, style
 
 _TICK_CHARACTERS = DEFAULTS.report.tick_characters
+_NARROW_CHARACTERS = 38
+"""Of a line of a title above a figure for a phone."""
 
 
 @style()
-def comparison_figure(c: Comparison, path: Path) -> Path:
-    """Residuals along the variables that explain most, one row a variable, with 95 % bands."""
+def comparison_figure(c: Comparison, path: Path, *, narrow: bool = False) -> Path:
+    """Residuals along the variables that explain most, one row a variable, with 95 % bands; ``narrow``: one panel a row."""
     variables = list(dict.fromkeys(curve.variable for curve in c.curves))[:5]
     ways = list(dict.fromkeys(curve.direction for curve in c.curves))
-    figure = Figure(figsize=(PAGE_IN, 1.8 * max(len(variables), 1) + 0.5))
-    axes = figure.subplots(max(len(variables), 1), max(len(ways), 1), squeeze=False)
+    rows, columns = max(len(variables), 1), max(len(ways), 1)
+    figure = Figure(figsize=(NARROW_IN, 1.5 * rows * columns + 0.8) if narrow else (PAGE_IN, 1.8 * rows + 0.5))
+    grid = figure.subplots(rows * columns, 1) if narrow else figure.subplots(rows, columns)
+    axes = np.reshape(grid, (rows, columns))
     for curve in c.curves:
         if curve.variable in variables:
             _draw_curve(axes[variables.index(curve.variable)][ways.index(curve.direction)], curve)
     for column, way in enumerate(ways):
-        axes[0][column].set_title(_axis(way))
+        for one in axes[:, column] if narrow else axes[:1, column]:
+            one.set_title(_axis(way))
     trials = f"{c.trials} trials; bands: 95 %, bootstrap over trials"
-    figure.suptitle(f"Measured − predicted by {c.model}, {ahead(c.near)} ahead ({trials})")
+    title = f"Measured − predicted by {c.model}, {ahead(c.near)} ahead ({trials})"
+    figure.suptitle(textwrap.fill(title, _NARROW_CHARACTERS) if narrow else title)
     return save(figure, path)[0]
 
 
@@ -70,11 +76,22 @@ def _draw_curve(axes: Axes, curve: Curve) -> None:
 
 
 @style()
-def diagnosis_figure(d: Diagnosis, path: Path, most: int = 12, errors: bool = True) -> Path:
-    """The error before and after (with ``errors``, where effects are named), and the gain of each effect that is added alone."""
+def diagnosis_figure(d: Diagnosis, path: Path, most: int = 12, errors: bool = True, *, narrow: bool = False) -> Path:
+    """The error before and after (with ``errors``, where effects are named), and the gain of each effect that is added alone.
+
+    ``narrow``: for a phone; without ``errors``.
+    """
     assert d.selection is not None
     rows = min(sum(bool(np.isfinite(c.paired_comparison.elpd_diff)) for c in d.selection.steps[0].ranking), most)
     falls = d.errors if d.effects and errors else None
+    if narrow:
+        figure = Figure(figsize=(NARROW_IN, 0.24 * rows + 1.6))
+        axes = figure.subplots()
+        ranking_axes(axes, d, most)
+        figure.suptitle(axes.get_title())  # longer than the axes are wide
+        axes.set(title="", xlabel="gain on held-out trials\n(log-likelihood per trial)")
+        _key_below(figure, axes)
+        return save(figure, path)[0]
     figure = Figure(figsize=(PAGE_IN * (1.25 if falls else 0.75), max(0.24 * rows + 1.2, 2.8)))
     if falls:
         left, right = figure.subplots(1, 2, width_ratios=(2, 3))
@@ -112,11 +129,25 @@ _ACCEPTED, _OTHERS, _REJECTED = "accepted", "not accepted", "not considered"
 
 
 @style()
-def error_by_step_figure(m: ExtendedModel, path: Path) -> Path:
+def error_by_step_figure(m: ExtendedModel, path: Path, *, narrow: bool = False) -> Path:
     """Errors on the same held-out windows, as given and with each effect added in turn; one line a horizon, noise dotted."""
-    figure = Figure(figsize=(PAGE_IN * 0.75, 3.0))
-    error_by_step_axes(figure.subplots(), m)
+    figure = Figure(figsize=(NARROW_IN, 3.6) if narrow else (PAGE_IN * 0.75, 3.0))
+    axes = figure.subplots()
+    error_by_step_axes(axes, m)
+    if narrow:
+        axes.set_ylabel("position error (mm, RMS)")
+        _key_below(figure, axes)
     return save(figure, path)[0]
+
+
+def _key_below(figure: Figure, axes: Axes) -> None:
+    """The legend of axes below them, where the width is all theirs."""
+    inside = axes.get_legend()
+    assert inside is not None
+    title = inside.get_title().get_text()
+    inside.remove()
+    handles = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
+    figure.legend(handles.values(), handles, title=title or None, loc="outside lower center", ncols=2, handlelength=1.5)
 
 
 def error_by_step_axes(axes: Axes, m: ExtendedModel) -> None:

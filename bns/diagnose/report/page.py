@@ -210,12 +210,13 @@ def _planned(p: Proposal | None) -> dict[str, Any] | None:
     return _drawn(partial(plan_figure, p), "the first proposed trials, as each explanation predicts them")
 
 
-def _drawn(draw: Callable[[Path], Path], alt: str) -> dict[str, Any]:
-    """A figure of the one style as data for the page, with the width that it is made for (pixels)."""
+def _drawn(draw: Callable[..., Path], alt: str) -> dict[str, Any]:
+    """A figure of the one style as data for the page, with the width that it is made for (pixels), and one for a phone."""
     with tempfile.TemporaryDirectory() as folder:
-        svg = draw(Path(folder) / "figure").with_suffix(".svg").read_bytes()
-    points = float(svg[:1000].partition(b'width="')[2].partition(b"pt")[0])
-    return {"data": base64.b64encode(svg).decode(), "width": round(_PIXELS_IN_POINT * points), "alt": alt}
+        wide, narrow = (draw(Path(folder) / "figure", narrow=thin).with_suffix(".svg").read_bytes() for thin in (False, True))
+    points = float(wide[:1000].partition(b'width="')[2].partition(b"pt")[0])
+    data, for_phone = (base64.b64encode(svg).decode() for svg in (wide, narrow))
+    return {"data": data, "narrow": for_phone, "width": round(_PIXELS_IN_POINT * points), "alt": alt}
 
 
 def _part(name: str) -> str:

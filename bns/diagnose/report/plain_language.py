@@ -18,6 +18,7 @@ from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.result import SelectionResult
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import numbers_of
+from bns.physics.figures import decimals
 
 _CAUSES = DEFAULTS.report.causes
 _LISTED = DEFAULTS.report.listed_causes
@@ -33,19 +34,12 @@ def figures_in_words(value: float, low: float | None, high: float | None, unit: 
     if not numbers:
         return "not known", ""
     spread = max(numbers) - min(numbers)
-    digits = _digits(spread if spread > 0 else abs(numbers[0]))
+    digits = decimals(spread if spread > 0 else abs(numbers[0]))
     gap = "" if shown.startswith("°") else " "
     ended = f"{gap}{shown}" if shown else ""
     if len(numbers) < 3:
         return f"{numbers[0]:.{digits}f}{ended}", ""
     return f"{numbers[0]:.{digits}f}{ended}", f"{numbers[1]:.{digits}f} to {numbers[2]:.{digits}f}{ended}"
-
-
-def _digits(size: float) -> int:
-    """Decimals that show two figures of a size; none of nothing."""
-    if size == 0.0:
-        return 0
-    return int(np.clip(1 - np.floor(np.log10(max(size, 1e-12))), 0, 8))
 
 
 def numbers_in_words(

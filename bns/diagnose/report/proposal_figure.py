@@ -18,7 +18,7 @@ from bns.diagnose.design.repeats import Repeats
 from bns.diagnose.estimate.stretch_noise import predicted_since_begin
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
-from bns.plotting.style import GREY, OKABE_ITO, lettered, panels, save, style
+from bns.plotting.style import GREY, NARROW_IN, OKABE_ITO, PAGE_IN, lettered, panels, save, style
 
 _FRAME_S = DEFAULTS.report.frame_s
 _SHOWN = DEFAULTS.report.planned_trials
@@ -26,34 +26,47 @@ _LEGEND_CHARACTERS = DEFAULTS.report.legend_characters
 
 
 @style()
-def plan_figure(p: Proposal, path: Path) -> Path:
-    """One panel per trial: the start, the path that each explanation predicts, the arena unless paths are much smaller."""
+def plan_figure(p: Proposal, path: Path, *, narrow: bool = False) -> Path:
+    """One panel per trial: the start, the path that each explanation predicts, the arena unless paths are much smaller.
+
+    ``narrow``: for a phone, the panels below each other.
+    """
     if isinstance(p.plan, Repeats):
-        return _repeats_figure(p, p.plan, path)
+        return _repeats_figure(p, p.plan, path, narrow=narrow)
     shown = min(_SHOWN, len(p.plan))
     seen = foreseen(p, np.arange(shown))
-    figure, axes = panels(shown, 2.6, wide=True)
+    figure, axes = _panels(shown, narrow=narrow)
     for trial, (axis,) in enumerate(axes):
         _draw_trial(axis, p, seen, trial)
-        axis.set_ylabel("y, north (cm)" if trial == 0 else "")
+        axis.set_ylabel("y, north (cm)" if trial == 0 or narrow else "")
         axis.set_title(lettered(trial, shown, f"trial {trial}, {p.plan.lasting_s[trial]:.0f} s"))
     _legend_below(figure, axes[0][0])
     return save(figure, path)[0]
 
 
+def _panels(shown: int, *, narrow: bool) -> tuple[Figure, NDArray[Any]]:
+    """Side by side, or below each other."""
+    figure, axes = panels(shown, 2.6, columns=1 if narrow else 3, wide=True)
+    if narrow:
+        figure.set_figwidth(NARROW_IN)
+    return figure, axes
+
+
 def _legend_below(figure: Figure, axes: Axes) -> None:
     """Explanations by name, in as many columns as the longest name leaves room for."""
     handles, names = axes.get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside lower center", ncols=max(1, min(3, _LEGEND_CHARACTERS // max(map(len, names)))))
+    room = _LEGEND_CHARACTERS * figure.get_figwidth() / PAGE_IN
+    ncols = max(1, min(3, int(room / max(map(len, names)))))
+    figure.legend(handles, names, loc="outside lower center", ncols=ncols)
 
 
-def _repeats_figure(p: Proposal, plan: Repeats, path: Path) -> Path:
+def _repeats_figure(p: Proposal, plan: Repeats, path: Path, *, narrow: bool) -> Path:
     """One panel a repeated cycle: where each explanation says that it ends, from its begin."""
     shown = min(_SHOWN, len(plan))
-    figure, axes = panels(shown, 2.6, wide=True)
+    figure, axes = _panels(shown, narrow=narrow)
     for trial, (axis,) in enumerate(axes):
         _draw_repeat(axis, p, plan, trial)
-        axis.set_ylabel("to its left (cm)" if trial == 0 else "")
+        axis.set_ylabel("to its left (cm)" if trial == 0 or narrow else "")
         axis.set_title(lettered(trial, shown, f"trial {trial}, {plan.lasting_s[trial]:.0f} s"))
     _legend_below(figure, axes[0][0])
     return save(figure, path)[0]

@@ -24,7 +24,7 @@ def proposal_text(p: Proposal, written: str = "", command: Mapping[str, str] | N
     ``written``: the file with the commands; ``command``: words (data, model) of the command line that the next ones repeat.
     """
     first = f"verdict so far: {p.verdict}; explanations to tell apart: {'; '.join(r.title for r in p.competing_models)}"
-    return "\n".join([first, *proposal_lines(p), *_next(p, written, command or {"data": "DATA", "model": "--model M"})])
+    return "\n".join([first, *proposal_lines(p), *_next(p, written, command or {"data": "LOG", "model": "--model MODEL"})])
 
 
 def model_pair_text(c: ModelPair) -> str:

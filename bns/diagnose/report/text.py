@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
@@ -26,7 +25,7 @@ from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import numbers_of, numbers_of_term, ties_of
 from bns.physics.decoys import DECOYS
 from bns.physics.effect import Effect
-from bns.physics.figures import with_unit
+from bns.physics.figures import figures_of_interval, with_unit
 
 _VERDICTS = {
     "none": "Nothing is missing that these measurements could show.",
@@ -47,6 +46,8 @@ _OF_NOISE = {
 }
 _SHOWN = DEFAULTS.report.rows
 _WIDTH = DEFAULTS.report.formula_width
+_DIGITS = 5
+"""Of a number in a list, at least."""
 _EXTENDED = "EXTENDED.yaml"
 
 
@@ -198,23 +199,16 @@ def _with_interval(effect: str, name: str, n: Mapping[str, Any]) -> str:
 
 
 def _number(name: str, n: Mapping[str, Any]) -> str:
-    digits = _digits(n["value"], n["low"], n["high"])
+    no_width = without_width(n["low"], n["high"])
+    digits = _DIGITS if no_width else figures_of_interval(n["value"], n["low"], n["high"], _DIGITS)
     said = f"{name} = {n['value']:.{digits}g}{with_unit(n['unit'])}"
-    if without_width(n["low"], n["high"]):
+    if no_width:
         loose = "one trial only, or no small change changes the loss"
         why = "it is at the bound of what it can be" if n.get("at_bound") else loose
         return f"{said} (no interval: {why})"
     mean = ", perhaps only the mean of delays that differ: see the notes" if n.get("of_mean") else ""
     beside = ", together with the free term only: see the notes" if n.get("cancels") else mean
     return f"{said} (95 %: {n['low']:.{digits}g} to {n['high']:.{digits}g}{beside})"
-
-
-def _digits(value: float, low: float, high: float) -> int:
-    """Five, or as many as show how far the ends of an interval are apart: of a place far from the origin more."""
-    if without_width(low, high) or not math.isfinite(high - low):
-        return 5
-    times = max(abs(value), abs(low), abs(high)) / abs(high - low)
-    return max(5, math.ceil(math.log10(times)) + 1)
 
 
 def _errors(errors: PairedErrors | None) -> Iterator[str]:

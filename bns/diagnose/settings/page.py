@@ -19,7 +19,7 @@ The values are defined in `bns/diagnose/settings`; this page is made from them b
 bns.diagnose.settings > docs/settings.md`. `--json` and `to_json()` carry all of them under `provenance`, with
 their digest, here `{{digest}}`. Two results with the same digest were made with the same settings.
 
-To use other values, write `bns diagnose LOG --model M --settings FILE.yaml` or `bns.diagnose(log, model,
+To use other values, write `bns diagnose LOG --model MODEL --settings FILE.yaml` or `bns.diagnose(log, model,
 settings=...)`. The file has a section for each folder (`select:`, below it `min_gain: 0.02`). What differs from the
 default is printed, and is listed in the provenance under `settings_changed`.
 

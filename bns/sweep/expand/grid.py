@@ -19,7 +19,7 @@ from typing import Any
 
 from bns.errors import SpecError, SweepWarning, unknown_name
 from bns.robots import load_robot
-from bns.spec import FIELDS, RunSpec, checked, unquoted
+from bns.spec import FIELDS, RunSpec, checked, evolvable, unquoted
 from bns.sweep.expand.combos import Parts, check_size, combinations
 from bns.sweep.expand.sample import range_names, read_sample
 from bns.sweep.expand.shipped_sweeps import sweep_file
@@ -290,7 +290,7 @@ def _checked(parts: Parts, name: str, key: Located, value: Located) -> Any:
     _check_parameter(name, key)
     given = value.value()
     try:
-        result = checked(name, given)
+        result = (checked if parts.stored else evolvable)(name, given)
     except SpecError as fault:
         hint = f" Lists belong under grid: '{name}: {given!r}' there." if isinstance(given, list) else ""
         value.fail(f"{fault}{hint}")

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.errors import SpecError, unknown_name
-from bns.spec import FIELDS, checked, field_type, unquoted
+from bns.spec import FIELDS, evolvable, field_type, unquoted
 from bns.sweep.expand.yaml_lines import Located
 
 DIGITS = 6
@@ -95,7 +95,7 @@ def _range(name: str, key: Located, value: Located) -> tuple[float, float]:
     if not isinstance(ends, list) or len(ends) != 2:
         value.fail(f"the range of {name} is {ends!r}; give its two ends: [low, high].")
     try:
-        low, high = (checked(name, end) for end in ends)
+        low, high = (evolvable(name, end) for end in ends)
     except SpecError as fault:
         value.fail(f"the range of {name}: {fault}")
     if not low < high:

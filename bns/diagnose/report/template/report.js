@@ -51,10 +51,10 @@
     make("path", {d: "M84,18V118H580", fill: "none", stroke: "#999"}, course);
     const text = (x, y, said, anchor) =>
       make("text", {x, y, "font-size": 15, fill: "#555", "text-anchor": anchor}, course).textContent = said;
-    text(90, 20, `${Math.round(most)} mm`, "start");
+    text(90, 24, `${Math.round(most)} mm`, "start");
     text(78, 122, "0", "end");
-    text(580, 138, `${last.toFixed(1)} s`, "end");
-    text(84, 138, "position error against time", "start");
+    text(580, 146, `${last.toFixed(1)} s`, "end");
+    text(84, 146, "position error against time", "start");
     for (const kind of rivals) {
       const d = path(trial.t.map((t, k) => on(t, error(kind, k))));
       make("path", {d, fill: "none", stroke: looks[kind][0], "stroke-dasharray": looks[kind][1], "stroke-width": 2}, course);
