@@ -19,6 +19,7 @@ from bns.diagnose.effect_caveats import (
     on_place,
     on_servo_speed,
     on_the_cone,
+    whose_error,
 )
 from bns.diagnose.estimate.cancelling import cancelled
 from bns.diagnose.estimate.plausibility import does_no_more
@@ -81,7 +82,7 @@ def notes_on(
         if name not in known or known[name].stage == "clock":
             why = " It may be an artefact of the log, such as rounded time stamps."
         elif known[name].of_measuring:
-            why = " It would be an error of the measurement, not of the robot."
+            why = f" It would be {whose_error(known[name])}."
         said = ", ".join(f"{key} = {number['value']:.3g}{with_unit(number['unit'])}" for key, number in numbers.items())
         yield (
             f"{name} is certain but negligible ({said}): without it no error on held-out trials is higher by {LEAST_FALL:.0%} or "

@@ -24,7 +24,7 @@ from bns.diagnose.select.variants import order_of_friction, uncertain_variants
 from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import numbers_of, tied_sets
 from bns.physics.effect import Effect, Parameter
-from bns.physics.figures import with_unit
+from bns.physics.figures import figures, figures_apart, with_unit
 from bns.physics.jointed.mechanism import machine
 from bns.physics.jointed.model import JointedModel
 from bns.physics.model import Model
@@ -53,9 +53,7 @@ def on_effects(
     }
     for name in sorted(names):
         if known[name].of_measuring:
-            begun = f"{name} {'would be' if name in tied else 'is'} an error of the measurement"
-            also = known[name].or_of_robot
-            yield f"{begun}, or else one of the model of the robot: {also}." if also else f"{begun}, not of the robot."
+            yield f"{name} {'would be' if name in tied else 'is'} {whose_error(known[name])}."
     chain = sorted((known[name] for name in names), key=lambda effect: (effect.place, effect.name))
     logged = {*tracks.extra, *(("session_s",) if tracks.start_known else ())}
     yield from (effect.caveat for effect in chain if effect.caveat and not logged.intersection(effect.explained_by))
@@ -79,6 +77,12 @@ def on_effects(
         )
         if tracks.start_known:
             yield from _on_drift(per_trial_effect.effect.name, tracks.start_s, own)
+
+
+def whose_error(effect: Effect) -> str:
+    """Of an effect of the measurement: whether something of the robot would leave the same log."""
+    also = effect.or_of_robot
+    return f"an error of the measurement, {f'or else one of the model of the robot: {also}' if also else 'not of the robot'}"
 
 
 def on_servo_speed(selection: SelectionResult) -> Iterator[str]:
@@ -197,8 +201,14 @@ def on_moved(found: Outcome) -> Iterator[str]:
         pairs = [(key, now[name][key], with_it) for key, with_it in numbers.items() if key in now.get(name, {})]
         moved = [(key, a, b) for key, a, b in pairs if not (_inside(a["value"], b) or _inside(b["value"], a))]
         if moved:
-            said = ", ".join(f"{key} = {b['value']:.4g}{with_unit(b['unit'])}, not {a['value']:.4g}" for key, a, b in moved)
+            said = ", ".join(_contrasted(key, b["value"], a["value"], b["unit"]) for key, a, b in moved)
             yield f"With {' and '.join(found.negligible)} in the model, the parameters of {name} differ: {said}."
+
+
+def _contrasted(name: str, value: float, other: float, unit: str) -> str:
+    """Two values of a number, with as many figures as show the difference: 1.0198, not 1.0202."""
+    count = figures_apart(value, other, 4)
+    return f"{name} = {figures(value, count)}{with_unit(unit)}, not {figures(other, count)}"
 
 
 def _inside(value: float, number: Mapping[str, Any]) -> bool:

@@ -8,6 +8,8 @@ import numpy as np
 
 MOST = 12
 """More figures than this are rounding."""
+LEAST_OF_INTERVAL = 5
+"""So many figures have a number and the ends of its interval at least."""
 
 
 def figures(value: float, count: int = 2) -> str:
@@ -25,7 +27,7 @@ def figures_apart(low: float, high: float, least: int = 2) -> int:
     return next((count for count in range(least, MOST) if figures(low, count) != figures(high, count)), least)
 
 
-def figures_of_interval(value: float, low: float, high: float, least: int = 5) -> int:
+def figures_of_interval(value: float, low: float, high: float, least: int = LEAST_OF_INTERVAL) -> int:
     """How many significant figures show a number and how far the ends of its interval are apart; at least so many.
 
     More than `figures_apart`: the ends do not only differ, they show their distance. A place far from the origin has many.

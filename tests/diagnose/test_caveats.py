@@ -23,7 +23,7 @@ from bns.diagnose.caveats import (
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosing import diagnose
 from bns.diagnose.diagnosis import Diagnosis
-from bns.diagnose.effect_caveats import _on_drift, _on_times, implausible_text, on_effects
+from bns.diagnose.effect_caveats import _on_drift, _on_times, implausible_text, on_effects, on_moved
 from bns.diagnose.estimate.parameters import FreeParameter
 from bns.diagnose.estimate.smoothing_tracker import SmoothingTracker
 from bns.diagnose.predict.paired_errors import Change, HorizonErrors, ModelError, PairedErrors
@@ -361,11 +361,15 @@ def test_notes_on_effects_know_whether_something_is_left(monkeypatch, terms, all
     assert told == [all_explained]
 
 
+OF_ROBOT = f"one of the model of the robot: {all_effects()['camera-rotation'].or_of_robot}"
+
+
 @pytest.mark.parametrize(
     ("name", "cause"),
     [
         ("slope-load", ""),
         ("camera-scale", " It would be an error of the measurement, not of the robot."),
+        ("camera-rotation", f" It would be an error of the measurement, or else {OF_ROBOT}."),
         ("clock-drift", " It may be an artefact of the log, such as rounded time stamps."),
     ],
 )
@@ -461,3 +465,15 @@ def test_numbers_that_are_only_known_together_are_said_to_be(monkeypatch, togeth
     tracks = SimpleNamespace(extra={}, start_known=False, commands_at_poses_s=None, timed=False)
     said = [note for note in on_effects(selection, tracks) if "only known together" in note]
     assert [note.split(":")[0] for note in said] == (["backlash"] if together else [])
+
+
+def test_two_numbers_that_differ_are_written_so(monkeypatch):
+    def of(value):
+        return {"value": value, "low": value - 1e-4, "high": value + 1e-4, "unit": "1"}
+
+    fit = SimpleNamespace(kept={"ratio": of(1.0198)})
+    beside = {"wheel-mismatch": {"ratio": of(1.0202)}}
+    moved = SimpleNamespace(selection=SimpleNamespace(fit=fit), beside_negligible=beside, negligible={"side-slip": {}})
+    monkeypatch.setattr("bns.diagnose.effect_caveats.numbers_of", lambda fit: {"wheel-mismatch": fit.kept})
+    (note,) = on_moved(moved)
+    assert note == "With side-slip in the model, the parameters of wheel-mismatch differ: ratio = 1.0202, not 1.0198."

@@ -24,6 +24,7 @@ NO_SETTINGS = {
     ("parallel.py", "MOST"): "threads: the answers are the same for any number",
     ("predict/wheels.py", "_KEPT"): "the size of a cache: the answers are the same for any",
     ("report/page.py", "_PIXELS_IN_POINT"): "layout",
+    ("report/figures.py", "_NARROW_CHARACTERS"): "layout",
     ("report/people.py", "_UNITS"): "factors between units, by definition",
     ("residuals/floor_field.py", "_WIDE_M"): "wider than the floor that tents cover, so that all of them are meant",
     ("predict/stretches.py", "_RIMS"): "where a rim has the friction of the floor within 1 %: saves simulations alone",

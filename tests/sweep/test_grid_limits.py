@@ -33,7 +33,7 @@ def test_more_seeds_than_anybody_can_run_are_refused(tmp_path):
 
 
 def test_product_that_would_fill_the_memory_is_refused_before_it_is_laid_out(tmp_path):
-    many = ", ".join(map(str, range(1, 1001)))
+    many = ", ".join(map(str, range(2, 1002)))
     names = "evaluations", "population_size", "generations_per_evaluation", "training_iterations_per_evaluation"
     grid = "grid:\n" + "".join(f"  {name}: [{many}]\n" for name in names[:3])
     refused(tmp_path, 4, "this makes 1000000000 runs", grid)

@@ -25,7 +25,7 @@ from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.values import numbers_of, numbers_of_term, ties_of
 from bns.physics.decoys import DECOYS
 from bns.physics.effect import Effect
-from bns.physics.figures import figures_of_interval, with_unit
+from bns.physics.figures import LEAST_OF_INTERVAL, figures_of_interval, with_unit
 
 _VERDICTS = {
     "none": "Nothing is missing that these measurements could show.",
@@ -46,8 +46,6 @@ _OF_NOISE = {
 }
 _SHOWN = DEFAULTS.report.rows
 _WIDTH = DEFAULTS.report.formula_width
-_DIGITS = 5
-"""Of a number in a list, at least."""
 _EXTENDED = "EXTENDED.yaml"
 
 
@@ -200,7 +198,7 @@ def _with_interval(effect: str, name: str, n: Mapping[str, Any]) -> str:
 
 def _number(name: str, n: Mapping[str, Any]) -> str:
     no_width = without_width(n["low"], n["high"])
-    digits = _DIGITS if no_width else figures_of_interval(n["value"], n["low"], n["high"], _DIGITS)
+    digits = LEAST_OF_INTERVAL if no_width else figures_of_interval(n["value"], n["low"], n["high"])
     said = f"{name} = {n['value']:.{digits}g}{with_unit(n['unit'])}"
     if no_width:
         loose = "one trial only, or no small change changes the loss"

@@ -43,6 +43,8 @@ EFFECT = Effect(
     "axes are turned, or the markers on the robot)",
     measurement="compare the tracked heading with a straight edge along the robot; or "
     "lay a straight edge along heading zero, track both of its ends, and measure its angle to the x axis",
+    or_of_robot="the robot drives at this angle to its axis, as with a wheel that is toed in. The tracked heading of a robot "
+    "that stands along a straight edge tells which",
     apply=apply,
     starts=tuple(
         (sign * a,)

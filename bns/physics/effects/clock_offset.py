@@ -28,6 +28,8 @@ EFFECT = Effect(
     beside={
         "command-delay": "A late command and a late clock look the same in a log: time-stamp an event that both clocks see."
     },
+    or_of_robot="if the offset is positive, the robot answers later than by a single lag, as with a filter in the controller "
+    "before that of the motor. An event that both clocks time-stamp tells which",
     apply=apply,
     needs="track",
     per_trial_allowed=True,
