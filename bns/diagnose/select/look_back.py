@@ -106,18 +106,29 @@ class LookBack:
         for name in accepted:
             # at a bound it may be: there it does, and earns, nothing
             believed = not self._acceptance.rejected(fit, name, bounds=False)
-            parts = extended(self._catalogue, name)
-            longer = bool(parts) or any(a.replaces for a in fit.model.effects if a.effect.name == name)
+            longer = bool(extended(self._catalogue, name)) or _replaces_given(fit, name)
             # an exchange since may have left it nothing to do; and what it extends may do as well from its numbers
             if believed and name == newest and not at_bound(fit, name) and not longer:
                 continue
-            simpler = reduced(self._catalogue, problem, fit, name)
+            simpler, parts = self._without(problem, fit, name)
             moved = variant(self._catalogue, name)
             needless = longer and not moved and not certainly_better((problem, simpler), (problem, fit))
             if not believed or needless or not self._acceptance.stays(problem, simpler, fit, name):
                 accepted = tuple(a for a in accepted if a != name) + parts
                 problem, fit = settled_problem(self._predictor, simpler.model, problem.pose_filter.noise)
         return problem, fit, accepted
+
+    def _without(self, problem: Problem, fit: Fit, name: str) -> tuple[Fit, tuple[str, ...]]:
+        """The fit that lacks an effect, and what stands in its place: what it extends, where that earns a place itself.
+
+        A patch under the wheels that is taken for one under the middle of the robot may predict worse than none.
+        """
+        simpler, parts = reduced(self._catalogue, problem, fit, name), extended(self._catalogue, name)
+        if not parts or variant(self._catalogue, name) or _replaces_given(fit, name):
+            return simpler, parts
+        if self._acceptance.may_stay(problem, simpler, parts[0]):
+            return simpler, parts
+        return reduced(self._catalogue, problem, simpler, parts[0]), ()
 
     def _shortened(
         self, problem: Problem, fit: Fit, accepted: tuple[str, ...]
@@ -134,6 +145,11 @@ class LookBack:
                 accepted = tuple(inside[0] if a == name else a for a in accepted)
                 problem, fit = settled_problem(self._predictor, inside[1].model, problem.pose_filter.noise)
         return problem, fit, accepted
+
+
+def _replaces_given(fit: Fit, name: str) -> bool:
+    """Whether an effect stands in the place of one of the model as it was given."""
+    return any(active.replaces for active in fit.model.effects if active.effect.name == name)
 
 
 def _from_their_numbers(problem: Problem, fit: Fit, pair: tuple[str, str], effect: Effect) -> Fit | None:
