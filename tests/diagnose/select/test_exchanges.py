@@ -265,13 +265,16 @@ def test_of_explanations_that_cannot_be_told_apart_the_one_with_fewest_numbers_i
     assert list(found.competing_models) == competing
 
 
-@pytest.mark.parametrize(("better", "kept"), [(True, ("longer", "b")), (False, ("b", "lag"))])
-def test_a_longer_effect_that_lowers_no_error_goes_back_to_the_one_that_it_extends(monkeypatch, better, kept):
+@pytest.mark.parametrize(
+    ("better", "earns", "kept"),
+    [(True, True, ("longer", "b")), (False, True, ("b", "lag")), (True, False, ("longer", "b")), (False, False, ("b",))],
+)
+def test_a_longer_effect_that_lowers_no_error_goes_back_to_the_one_that_it_extends(monkeypatch, better, earns, kept):
     search = LookBack.__new__(LookBack)
     search._catalogue = {name: SimpleNamespace(extends=part) for name, part in (("lag", ""), ("longer", "lag"), ("b", ""))}
     fit = SimpleNamespace(model=SimpleNamespace(effects=()))
     monkeypatch.setattr(search, "_shortened", lambda *state: state)
-    search._acceptance = SimpleNamespace(rejected=lambda *_, **__: "", stays=lambda *_: True)
+    search._acceptance = SimpleNamespace(rejected=lambda *_, **__: "", stays=lambda *_: True, may_stay=lambda *_: earns)
     search._predictor = None
     monkeypatch.setattr(look_back, "settled_problem", lambda _predictor, model, _: (problem, SimpleNamespace(model=model)))
     for name, answer in (("at_bound", False), ("variant", False), ("certainly_better", better), ("reduced", fit)):
