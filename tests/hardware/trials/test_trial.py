@@ -150,7 +150,7 @@ def test_measurements_whose_journal_is_gone_are_not_written_over(tmp_path, capsy
         assert f"{table} is there, and journal.jsonl, from which it was made, is gone" in said
         assert f"move the folder {journal.parent} away" in said
         assert table.read_bytes() == kept
-    compare = re.search(r"bns (compare \S+ \S+ \S+csv)", said)[1].replace(" M ", " khepera ")
+    compare = re.search(r"bns (compare \S+ \S+ \S+csv)", said)[1].replace(" MODEL ", " khepera ")
     assert call(*compare.split()) == 0
     journal.parent.rename(tmp_path / "away")
     assert call(*asked) == 0
