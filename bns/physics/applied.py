@@ -9,8 +9,7 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import traceback
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from functools import partial
 from numbers import Real
 from types import CodeType
@@ -34,16 +33,16 @@ def applied(effect: Effect, signal: S, values: Mapping[str, Any]) -> S:
     if not effect.is_own:
         result: S = effect.apply(signal, **values)
         return result
+    shown = _read_only(signal)
     try:
-        with _locked(signal):
-            given = effect.apply(signal, **values)
+        given = effect.apply(shown, **values)
     except (BnsError, MemoryError):
         raise
     except ArithmeticError as fault:  # as of a formula: it may have no value at these numbers alone
         raise ModelError(_does_not_run(effect, effect.apply, fault)) from fault
     except Exception as fault:
         raise EffectError(_raised(effect, signal, values, fault)) from fault
-    return _checked(effect, signal, given, values)
+    return _own_arrays(_checked(effect, shown, given, values), shown, signal)
 
 
 def starts_of(effect: Effect, wheels: Wheels) -> tuple[tuple[float, ...], ...]:
@@ -104,32 +103,28 @@ def _checked(effect: Effect, signal: S, given: Any, values: Mapping[str, Any]) -
             what = f"{field.name} is not finite (nan or inf) somewhere on these trials with {dict(values)}"
             write = "Write it so that it is finite for every speed, at rest and in steps of length 0 too."
             raise ModelError(_said(effect, effect.apply, f"{what}. {write}"))
-    return _unlocked(given)
+    return given
 
 
-@contextmanager
-def _locked(signal: Any) -> Iterator[None]:
-    """Arrays that cannot be written: other effects and other numbers of this one start from the same signal."""
-    locked = [array for array in _arrays(signal) if array.flags.writeable]
-    for array in locked:
-        array.flags.writeable = False
-    try:
-        yield
-    finally:
-        for array in locked:
-            array.flags.writeable = True
+def _read_only(signal: S) -> S:
+    """The signal with views that cannot be written: other effects, in other threads too, start from the same arrays."""
+    views = {name: array.view() for name, array in _arrays(signal).items()}
+    for view in views.values():
+        view.flags.writeable = False
+    return dataclasses.replace(signal, **views)  # type: ignore[type-var]  # all signals are dataclasses
 
 
-def _unlocked(given: S) -> S:
-    """A view of an array that was locked stays so; compiled code takes arrays that can be written."""
-    fields = [field.name for field in dataclasses.fields(given)]  # type: ignore[arg-type]  # all signals are dataclasses
-    views = [n for n in fields if isinstance(a := getattr(given, n), np.ndarray) and not a.flags.writeable]
-    return dataclasses.replace(given, **{n: getattr(given, n).copy(order="K") for n in views}) if views else given  # type: ignore[type-var]
+def _own_arrays(given: S, shown: S, signal: S) -> S:
+    """What an effect returned, with the signal's arrays again in place of their views, and copies of parts of these."""
+    views = {id(view): getattr(signal, name) for name, view in _arrays(shown).items()}
+    back = {n: views.get(id(a), a) for n, a in _arrays(given).items() if not a.flags.writeable}
+    parts = {n: a.copy(order="K") if a is getattr(given, n) else a for n, a in back.items()}
+    return dataclasses.replace(given, **parts)  # type: ignore[type-var]  # all signals are dataclasses
 
 
-def _arrays(signal: Any) -> list[Array]:
-    values = [getattr(signal, field.name) for field in dataclasses.fields(signal)]
-    return [value for value in values if isinstance(value, np.ndarray)]
+def _arrays(signal: Any) -> dict[str, Array]:
+    values = {field.name: getattr(signal, field.name) for field in dataclasses.fields(signal)}
+    return {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
 
 
 def _what_it_must_be(signal: Any, before: Any, after: Any) -> str:

@@ -190,3 +190,20 @@ def test_a_view_of_what_it_gets_may_be_written_by_what_comes_after():
     assert given.left_m_s.flags.writeable
     given.left_m_s[0, 0] = 7
     assert (wheels.right_m_s == 1).all()
+
+
+def test_arrays_can_be_written_by_others_while_an_effect_acts():
+    """Other threads work on them; what comes back untouched is the same array, also one that could not be written before."""
+    wheels = Wheels(np.ones((2, 3)), np.ones((2, 3)), np.ones((2, 3)), 0.1)
+    wheels.right_m_s.flags.writeable = False
+
+    def apply(given, k):
+        wheels.left_m_s[0, 0] = 3.0
+        with pytest.raises(ValueError, match="read-only"):
+            given.left_m_s[0, 0] = 4.0
+        return replace(given, step_s=given.step_s * 2.0)
+
+    found = applied(own("wheel", apply), wheels, {"k": 0.5})
+    assert found.left_m_s is wheels.left_m_s
+    assert found.right_m_s is wheels.right_m_s
+    assert (found.step_s == 2.0).all()

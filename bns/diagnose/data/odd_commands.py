@@ -88,9 +88,9 @@ def lost_commands(table: pd.DataFrame, trials: Sequence[tuple[str, np.ndarray]])
     )
 
 
-def count_lost(table: pd.DataFrame) -> int:
-    """How many commands `lost_commands` would tell in a table of one trial; 0 if there are too few."""
-    return len(_lost(table, [np.arange(len(table))])[0])
+def count_lost(table: pd.DataFrame, trials: Sequence[np.ndarray]) -> int:
+    """How many commands `lost_commands` would tell; 0 if there are too few. ``trials``: row numbers, in the order of time."""
+    return len(_lost(table, trials)[0])
 
 
 def with_commands_held(table: pd.DataFrame, trials: Sequence[np.ndarray]) -> pd.DataFrame:

@@ -111,3 +111,13 @@ def test_a_proposal_keeps_the_command_before_in_force(zeros):
     assert {"forward_m_s", "turn_rad_s"} <= set(guess.mapping["columns"])
     assert guess.mapping.get("lost_commands") == ("held" if zeros[0] == 8 else None)
     assert any("8 times both commands are 0 for a moment" in said for said in guess.remarks) == (zeros[0] == 8)
+
+
+def test_a_proposal_looks_at_each_trial_by_itself():
+    """Times begin again in each: one trial's stand lies between another's commands."""
+    table = log((0, 0), trials=tuple("abcd"))
+    stands = table["trial"].isin(["b", "c"])
+    table.loc[stands, ["left_m_s", "right_m_s"]] = 0.0
+    table.loc[stands, "t_s"] += 0.003
+    assert "lost_commands" not in guessed(table).mapping
+    assert guessed(log((8, 2))).mapping["lost_commands"] == "held"

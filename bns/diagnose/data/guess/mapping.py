@@ -135,8 +135,10 @@ def _lost_commands(table: pd.DataFrame, entries: Entries) -> int:
     if not pair or "t_s" not in entries or entries["t_s"].get("unit") == "date":
         return 0
     columns = [in_si(table, entries[name], with_unit=True) for name in ("t_s", *pair)]
-    told = pd.DataFrame(dict(zip(("t_s", *COMMANDS), columns, strict=True))).dropna()
-    return count_lost(told.sort_values("t_s", kind="stable", ignore_index=True))
+    told = pd.DataFrame(dict(zip(("t_s", *COMMANDS), columns, strict=True)))
+    told = told.assign(trial=table[entries["trial"]["from"]].to_numpy() if "trial" in entries else 0).dropna()
+    told = told.sort_values("t_s", kind="stable", ignore_index=True)
+    return count_lost(told, [np.asarray(rows) for rows in told.groupby("trial").indices.values()])
 
 
 def _of_lost_commands(count: int) -> str:
