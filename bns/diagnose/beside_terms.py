@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
+from bns.diagnose.estimate.cancelling import cancelled
 from bns.diagnose.estimate.cross_validation import Judged, judged_errors
+from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.plausibility import implausible, undetermined
 from bns.diagnose.estimate.problem import problem_for
 from bns.diagnose.predict.base import Predictor
@@ -14,6 +16,8 @@ from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals.along_variables import residual_dependence
 from bns.diagnose.residuals.earned_terms import left_over
 from bns.diagnose.residuals.established import Established, established
+from bns.diagnose.residuals.grammar import PAST, SHIFTS
+from bns.diagnose.residuals.symbolic import Formula
 from bns.diagnose.residuals.unexplained import Unexplained, unexplained
 from bns.diagnose.select.known_effects import known_effects
 from bns.diagnose.select.negligible import below_noise, fall_matters, negligible_and_errors
@@ -104,11 +108,11 @@ def without_absurd(
     found: Established, stands: Standing, predictor: Predictor, response: bool | None, barred: Collection[str] = ()
 ) -> Established:
     """Without what lowers no error; searched again without effects that are `_absurd`: their terms serve only beside them."""
-    selection = stands.selection
+    selection, gone = stands.selection, set(barred)
     found = _without_negligible(found, selection, predictor)
-    while absurd := _absurd(found):
-        selection = selection.lacking(absurd)
-        again = sought_terms(selection, predictor, stands.rest, response, barred)
+    while absurd := _absurd(found, selection.fit):
+        selection, gone = selection.lacking(absurd), {*gone, *absurd}
+        again = sought_terms(selection, predictor, stands.rest, response, gone)
         if again is None:
             break
         found = _without_negligible(again, selection, predictor)
@@ -142,10 +146,17 @@ def _without_negligible(found: Established, selection: SelectionResult, predicto
     return Established(names, terms, problem, fit)
 
 
-def _absurd(found: Established) -> tuple[str, ...]:
-    """Effects whose numbers, fitted beside the terms, cannot be believed: they only compensate for a part of a term."""
+def _absurd(found: Established, without: Fit) -> tuple[str, ...]:
+    """Effects whose numbers, fitted beside the terms, cannot be believed: they only compensate for a part of a term.
+
+    ``without``: the fit of the effects without terms. A shift in time (`SHIFTS`) whose number an answer to past commands
+    multiplies or turns round (`cancelled`) is a part of that answer: nothing tells when such an answer begins from when the
+    command comes.
+    """
     own = found.names if found.terms else ()
-    return tuple(name for name in own if implausible(found.fit, name) or undetermined(found.fit, name))
+    past = any(term.signal in PAST for term in found.terms)
+    parts = [one.name for one in cancelled(without, found.fit, [n for n in own if n in SHIFTS], past)] if past else []
+    return tuple(name for name in own if name in parts or implausible(found.fit, name) or undetermined(found.fit, name))
 
 
 def does_better_than_more(found: Established, selection: SelectionResult, lost: tuple[str, ...]) -> bool:
@@ -156,6 +167,16 @@ def does_better_than_more(found: Established, selection: SelectionResult, lost: 
     if not 0 < len(found.terms) < len(lost):
         return False
     return certainly_lower((selection.problem, selection.fit), (found.problem, found.fit), throughout=True)
+
+
+def terms_rejected(with_terms: PairedErrors | None) -> bool:
+    """Does the error on held-out trials not fall with the terms, or certainly rise at a horizon? They are not added then."""
+    return with_terms is not None and not with_terms.falls_in_the_end
+
+
+def presented_fit(selection: SelectionResult, terms: Sequence[Formula], with_terms: PairedErrors | None) -> Fit:
+    """The fit whose numbers are shown: with the terms, where there are some that may be added."""
+    return terms[0].fit if terms and not terms_rejected(with_terms) else selection.fit
 
 
 def terms_matter(errors: PairedErrors) -> bool:

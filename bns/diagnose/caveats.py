@@ -6,11 +6,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from bns.diagnose.beside_terms import presented_fit
 from bns.diagnose.data.split_trials import finer
 from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.data.variables import bare, label, velocity
 from bns.diagnose.effect_caveats import (
-    implausible_text,
+    implausible_texts,
     on_effects,
     on_heading,
     on_kept,
@@ -60,7 +61,7 @@ def notes_on(
     ``terms``, ``slight``, ``formula_in_words``: the terms and the formula in words.
     """
     selection = found.selection
-    yield from (implausible_text(selection, name) for name in selection.implausible)
+    yield from implausible_texts(selection, presented_fit(selection, found.terms, found.errors_with_terms))
     if len(selection.accepted) >= MOST_EFFECTS:
         yield f"The search ends at {MOST_EFFECTS} effects; more may be missing."
     if found.imitating:

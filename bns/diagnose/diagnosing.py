@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from bns.diagnose.beside_terms import presented_fit
 from bns.diagnose.caveats import notes_on
 from bns.diagnose.data.split_trials import finer
 from bns.diagnose.data.tracks import Tracks
-from bns.diagnose.diagnosis import Diagnosis, presented_fit
+from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.calibration import calibrated
 from bns.diagnose.estimate.plausibility import fitted_again
 from bns.diagnose.estimate.significance import fewest_trials

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
+from bns.diagnose.beside_terms import presented_fit, terms_rejected
 from bns.diagnose.estimate.calibration import wheel_sizes
 from bns.diagnose.estimate.cancelling import cancelled
 from bns.diagnose.estimate.fit import Fit
@@ -85,7 +86,13 @@ class Diagnosis:
     @property
     def terms_rejected(self) -> bool:
         """Does the error on held-out trials not fall with the terms, or certainly rise at a horizon? They are not added then."""
-        return _rejected(self.errors_with_terms)
+        return terms_rejected(self.errors_with_terms)
+
+    @property
+    def presented(self) -> Fit:
+        """The fit whose numbers are shown (`presented_fit`); there must have been a search."""
+        assert self.selection is not None
+        return presented_fit(self.selection, self.terms, self.errors_with_terms)
 
     def as_json(self) -> dict[str, Any]:
         """One object of plain values, as `bns diagnose --json` prints it."""
@@ -93,7 +100,7 @@ class Diagnosis:
         return {
             "verdict": self.verdict,
             "effects": list(self.effects),
-            "implausible": selection.implausible if selection else {},
+            "implausible": selection.implausible_in(self.presented) if selection else {},
             "parameters": self.numbers,
             "negligible": dict(self.negligible),
             "imitating": list(self.imitating),
@@ -158,7 +165,7 @@ class Diagnosis:
         if self.calibration is not None and not self.terms:
             together = numbers_of(self.calibration)
             return {name: together.get(name, values) for name, values in numbers_of(self.selection.fit).items()}
-        fit = presented_fit(self.selection, self.terms, self.errors_with_terms)
+        fit = self.presented
         own = {term.name for term in self.terms}
         found = {name: values for name, values in numbers_of(fit).items() if name not in own}
         if fit is not self.selection.fit:
@@ -207,12 +214,3 @@ class Diagnosis:
             "dse": plain(comparison.dse),
             "p_value": comparison.p_value,
         }
-
-
-def _rejected(with_terms: PairedErrors | None) -> bool:
-    return with_terms is not None and not with_terms.falls_in_the_end
-
-
-def presented_fit(selection: SelectionResult, terms: Sequence[Formula], with_terms: PairedErrors | None) -> Fit:
-    """The fit whose numbers are shown: with the terms, where there are some that may be added."""
-    return terms[0].fit if terms and not _rejected(with_terms) else selection.fit

@@ -10,7 +10,7 @@ from scipy.special import stdtr
 
 from bns.diagnose.data.stamps import stamp_scatter
 from bns.diagnose.data.tracks import Array, Tracks
-from bns.diagnose.estimate.fit import without_width
+from bns.diagnose.estimate.fit import Fit, without_width
 from bns.diagnose.estimate.plausibility import known_together
 from bns.diagnose.estimate.smoothing_tracker import LATE, smoothing_tracker
 from bns.diagnose.outcome import Outcome
@@ -97,10 +97,15 @@ def on_servo_speed(selection: SelectionResult) -> Iterator[str]:
         )
 
 
-def implausible_text(selection: SelectionResult, name: str) -> str:
-    """What to say of an accepted effect whose numbers no robot should have."""
-    said = f"{name} fits best, but with an implausible value: {selection.implausible[name]}. No other set predicts as well; "
-    model = selection.fit.model
+def implausible_texts(selection: SelectionResult, fit: Fit) -> Iterator[str]:
+    """What to say of accepted effects whose numbers in a fit, the one that is shown, no robot should have."""
+    for name, why in selection.implausible_in(fit).items():
+        yield _implausible_text(fit, name, why)
+
+
+def _implausible_text(fit: Fit, name: str, why: str) -> str:
+    said = f"{name} fits best, but with an implausible value: {why}. No other set predicts as well; "
+    model = fit.model
     if name != "wheelbase" or not isinstance(model, Model):
         return f"{said}check it by an independent measurement."
     really = model.wheelbase_m * model.values_of(name)["factor"]

@@ -23,7 +23,7 @@ from bns.diagnose.caveats import (
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosing import diagnose
 from bns.diagnose.diagnosis import Diagnosis
-from bns.diagnose.effect_caveats import _on_drift, _on_times, implausible_text, on_effects, on_moved
+from bns.diagnose.effect_caveats import _on_drift, _on_times, implausible_texts, on_effects, on_moved
 from bns.diagnose.estimate.parameters import FreeParameter
 from bns.diagnose.estimate.smoothing_tracker import SmoothingTracker
 from bns.diagnose.predict.paired_errors import Change, HorizonErrors, ModelError, PairedErrors
@@ -335,7 +335,7 @@ def test_a_slip_in_seconds_is_no_time():
 def test_so_many_more_trials_as_would_make_a_sign_certain_are_asked_for(z, more):
     """The gain in standard errors grows with the root of the trials: from 2 to 3.2 it takes 2.56 times as many."""
     selection = SimpleNamespace(
-        implausible={}, accepted=(), competing_models=(), steps=(SimpleNamespace(ranking=()),),
+        implausible_in=lambda _: {}, accepted=(), competing_models=(), steps=(SimpleNamespace(ranking=()),),
         fit=SimpleNamespace(model=NOMINAL, free=()), nominal=SimpleNamespace(losses=np.ones(10)),
     )  # fmt: skip
     nothing = dict.fromkeys(("imitating", "withdrawn", "unseen", "negligible", "formula", "errors_with_terms"))
@@ -346,13 +346,13 @@ def test_so_many_more_trials_as_would_make_a_sign_certain_are_asked_for(z, more)
     assert note == f"turn-slip may be missing, but 10 trials are too few to decide; about {more} more would decide."
 
 
-@pytest.mark.parametrize(("terms", "all_explained"), [((), True), (("a term",), False)])
+@pytest.mark.parametrize(("terms", "all_explained"), [((), True), ((SimpleNamespace(fit=None),), False)])
 def test_notes_on_effects_know_whether_something_is_left(monkeypatch, terms, all_explained):
     told = []
     monkeypatch.setattr("bns.diagnose.caveats.on_effects", lambda *given: [told.append(given[3])])
     nothing = dict.fromkeys(("imitating", "withdrawn", "unseen", "negligible", "formula", "errors_with_terms"))
     nothing |= {"beside_negligible": {}, "kept_for": {}, "seen_in_heading": {}, "slight_along": ()}
-    selection = SimpleNamespace(implausible={}, accepted=())
+    selection = SimpleNamespace(implausible_in=lambda _: {}, accepted=(), fit=None)
     found = SimpleNamespace(**nothing | {"selection": selection, "rest": NOTHING, "terms": terms, "negligible": {}})
     monkeypatch.setattr("bns.diagnose.caveats.on_moved", lambda _: [])
     notes = notes_on(found, None, None)
@@ -378,7 +378,7 @@ def test_a_number_without_a_unit_is_written_without_one(monkeypatch, name, cause
     monkeypatch.setattr("bns.diagnose.caveats.on_effects", lambda *_: [])
     monkeypatch.setattr("bns.diagnose.caveats.on_moved", lambda _: ["What it moves."])
     selection = SimpleNamespace(
-        implausible={}, accepted=(), competing_models=(), steps=(SimpleNamespace(ranking=()),),
+        implausible_in=lambda _: {}, accepted=(), competing_models=(), steps=(SimpleNamespace(ranking=()),),
         fit=SimpleNamespace(model=NOMINAL, free=()), nominal=SimpleNamespace(losses=np.ones(10)),
     )  # fmt: skip
     numbers = {"x_m_s": {"value": 0.0026, "unit": "m/s"}, "behind_share": {"value": 0.00124, "unit": "1"}}
@@ -395,10 +395,12 @@ def test_a_number_without_a_unit_is_written_without_one(monkeypatch, name, cause
 
 def test_an_implausible_wheelbase_is_asked_about_with_both_distances():
     fit = SimpleNamespace(model=NOMINAL.with_effect("wheelbase", factor=1.5).with_effect("speed-gain", gain=1.5))
-    selection = SimpleNamespace(fit=fit, implausible={"wheelbase": "factor = 1.5 is too much", "speed-gain": "so is gain"})
-    said = implausible_text(selection, "wheelbase")
-    assert said.endswith("is the wheelbase really 0.0884 m, and not 0.133 m?")
-    assert implausible_text(selection, "speed-gain").endswith("check it by an independent measurement.")
+    why = {"wheelbase": "factor = 1.5 is too much", "speed-gain": "so is gain"}
+    selection = SimpleNamespace(implausible_in=lambda shown: why if shown is fit else pytest.fail("another fit"))
+    on_wheelbase, on_gain = implausible_texts(selection, fit)
+    assert on_wheelbase.startswith("wheelbase fits best, but with an implausible value: factor = 1.5 is too much. ")
+    assert on_wheelbase.endswith("is the wheelbase really 0.0884 m, and not 0.133 m?")
+    assert on_gain.endswith("check it by an independent measurement.")
 
 
 @pytest.mark.parametrize(("r", "said"), [(0.80, True), (0.78, False), (-0.80, True)])

@@ -13,7 +13,7 @@ from bns.diagnose.comparison import Comparison
 from bns.diagnose.data.checks import Finding
 from bns.diagnose.design.competing_models import Rival
 from bns.diagnose.diagnosis import Diagnosis
-from bns.diagnose.effect_caveats import implausible_text
+from bns.diagnose.effect_caveats import implausible_texts
 from bns.diagnose.estimate.calibration import wheel_sizes
 from bns.diagnose.estimate.fit import without_width
 from bns.diagnose.predict.paired_errors import Change, PairedErrors
@@ -76,7 +76,7 @@ def _diagnosis(d: Diagnosis, rivals: Sequence[Rival], command: Mapping[str, str]
         them = "it" if len(d.effects) == 1 else "them"
         said = _VERDICTS[d.verdict].format(effects=enumerated(d.effects) or "nothing listed", them=them)
         yield f"{said} {ABOVE_NOISE}" if nothing_above_noise(d) else said
-    odd = [implausible_text(d.selection, name) for name in d.selection.implausible] if d.selection is not None else []
+    odd = [*implausible_texts(d.selection, d.presented)] if d.selection else []
     yield from odd
     if d.selection is not None:
         known = known_effects(d.selection)

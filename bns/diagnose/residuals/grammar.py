@@ -27,6 +27,8 @@ from bns.physics.formula_value import FUNCTIONS
 RESPONSE = "response of each wheel in time"
 SHIFTS = ("clock-offset", "command-delay")
 """Effects that shift all motion in time: beside a free response in time (`RESPONSE`) nothing tells their number from it."""
+APART = ("heading-delay",)
+"""Effects that shift the motion forwards against the turning: likewise beside a free response of one of both (`RESPONSE_OF`)."""
 RESPONSE_OF = {"v": "response of the forward velocity in time", "w": "response of the turning velocity in time"}
 RESPONSE_ALONE = {LEFT: "response of the left wheel in time", RIGHT: "response of the right wheel in time"}
 """What an effect that acts alike on both wheels cannot be: beside a lag of both, the other lag of one."""

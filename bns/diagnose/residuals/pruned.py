@@ -15,7 +15,7 @@ from bns.diagnose.estimate.starts import fit_with
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.residuals.along_variables import residual_dependence
 from bns.diagnose.residuals.earned_terms import term_earns
-from bns.diagnose.residuals.grammar import PAST, RESPONSE, SHIFTS
+from bns.diagnose.residuals.grammar import APART, PAST, RESPONSE, RESPONSE_OF, SHIFTS
 from bns.diagnose.residuals.search_state import State
 from bns.diagnose.residuals.symbolic import fitted
 from bns.diagnose.residuals.unexplained import unexplained
@@ -110,12 +110,16 @@ def without_idle_terms(predictor: Predictor, state: State, level: float) -> Stat
 def without_shifts(predictor: Predictor, given: Model, state: State) -> State:
     """Without the effects that a free response in time contains, however well they do beside its coarse steps.
 
+    That is a shift of all motion in a response of both wheels, and one of the motion forwards against the turning (`APART`)
+    in that of either.
+
     Beside any other free answer to past commands, without those that earn nothing in a model without terms, the least first: a
     late command and a clock that is early by as much make up for its steps together.
     """
-    if any(term.signal == RESPONSE for term in state.terms):
-        for name in [shift for shift in SHIFTS if shift in state.names]:
-            state = state.without(predictor, name, fit_without(state.problem, state.fit, name))
+    signals = {term.signal for term in state.terms}
+    contained = (*(SHIFTS if RESPONSE in signals else ()), *(APART if signals.intersection(RESPONSE_OF.values()) else ()))
+    for name in [shift for shift in contained if shift in state.names]:
+        state = state.without(predictor, name, fit_without(state.problem, state.fit, name))
     while any(term.signal in PAST for term in state.terms) and not {*SHIFTS}.isdisjoint(state.names):
         worth = {name: gain for name, gain in worth_alone(predictor, given, state).items() if name in SHIFTS}
         least = min(worth, key=lambda name: worth[name])

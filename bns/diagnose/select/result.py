@@ -65,10 +65,12 @@ class SelectionResult:
     steps: tuple[SelectionStep, ...]
     competing_models: tuple[tuple[str, ...], ...] = ()
 
-    @property
-    def implausible(self) -> dict[str, str]:
-        """Accepted effects whose numbers are beyond what is plausible: name -> why. They predict better than any other set."""
-        why = {name: implausible(self.fit, name, bounds=False) for name in self.accepted}
+    def implausible_in(self, fit: Fit) -> dict[str, str]:
+        """Accepted effects whose numbers in a fit are beyond what is plausible: name -> why. No other set predicts as well.
+
+        ``fit``: whose numbers are shown. Those of the search differ from them where flexible terms came in after it.
+        """
+        why = {name: implausible(fit, name, bounds=False) for name in self.accepted}
         return {name: text for name, text in why.items() if text}
 
     def only(self, names: tuple[str, ...]) -> SelectionResult:

@@ -115,7 +115,7 @@ def test_it_is_among_the_notes_where_the_term_is_in_the_extended_model(monkeypat
     monkeypatch.setattr("bns.diagnose.caveats._on_undescribed", lambda found: ["on what is left"])
     monkeypatch.setattr("bns.diagnose.caveats.single_wheel", lambda fit: [f"one wheel by {fit.values[0]}"])
     selection = SimpleNamespace(
-        implausible={}, accepted=("battery-sag",), competing_models=(), steps=(SimpleNamespace(ranking=()),),
+        implausible_in=lambda _: {}, accepted=("battery-sag",), competing_models=(), steps=(SimpleNamespace(ranking=()),),
         fit=fit_of((*SAG, 1e-4, 0.8e-4, 1.2e-4)), nominal=SimpleNamespace(losses=np.ones(10)),
     )  # fmt: skip
     nothing = dict.fromkeys(("withdrawn", "unseen", "formula"))

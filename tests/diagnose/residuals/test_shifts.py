@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bns.diagnose.residuals import pruned as module
-from bns.diagnose.residuals.grammar import RESPONSE, RESPONSE_OF, WHEELS
+from bns.diagnose.residuals.grammar import CHANGES, RESPONSE, RESPONSE_OF, WHEELS
 
 
 @dataclass(frozen=True)
@@ -23,11 +23,11 @@ class Beside:
         return replace(self, names=tuple(one for one in self.names if one != name))
 
 
-def left(monkeypatch, alone, signal):
+def left(monkeypatch, alone, signal, also=()):
     """The names that stay of those in ``alone``: name -> what it earns without terms, by the names that are still there."""
     monkeypatch.setattr(module, "fit_without", lambda *_: None)
     monkeypatch.setattr(module, "worth_alone", lambda _predictor, _given, state: {n: alone(n, state.names) for n in state.names})
-    names = ("motor-lag", "command-delay", "clock-offset")
+    names = ("motor-lag", "command-delay", "clock-offset", *also)
     return module.without_shifts(None, None, Beside(names, (SimpleNamespace(signal=signal),))).names
 
 
@@ -57,3 +57,15 @@ def test_beside_terms_that_are_no_answer_to_past_commands_they_stay(monkeypatch,
 
 def test_beside_a_free_response_of_the_wheels_they_go_however_well_they_do(monkeypatch):
     assert left(monkeypatch, lambda *_: 50.0, RESPONSE) == ("motor-lag",)
+
+
+@pytest.mark.parametrize("axis", ["v", "w"])
+def test_headings_that_come_late_are_a_part_of_a_response_of_one_of_both_motions(monkeypatch, axis):
+    """Such a response can begin later than the other motion does."""
+    kept = left(monkeypatch, lambda *_: 50.0, RESPONSE_OF[axis], ("heading-delay",))
+    assert kept == ("motor-lag", "command-delay", "clock-offset")
+
+
+@pytest.mark.parametrize("signal", [CHANGES, WHEELS])
+def test_beside_other_terms_late_headings_stay(monkeypatch, signal):
+    assert "heading-delay" in left(monkeypatch, lambda *_: 50.0, signal, ("heading-delay",))

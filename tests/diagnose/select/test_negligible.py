@@ -18,6 +18,7 @@ from bns.diagnose.estimate.starts import listed
 from bns.diagnose.predict.wheels import WheelPredictor
 from bns.diagnose.residuals import unexplained as rest_module
 from bns.diagnose.residuals.established import Established
+from bns.diagnose.residuals.grammar import CHANGES
 from bns.diagnose.residuals.symbolic import fitted
 from bns.diagnose.residuals.unexplained import NOTHING
 from bns.diagnose.select import negligible as negligible_module
@@ -218,16 +219,43 @@ def test_beside_terms_an_effect_at_its_bound_is_left_out_and_the_terms_are_searc
     """Terms and a wheelbase that run away from each other serve together, and neither says anything."""
     searched = selected("wheelbase", "wheel-mismatch")
     numbers = [(number.parameter, number.effect) for number in searched.fit.free]
+    term = SimpleNamespace(signal="place")
     at_bound = np.array([p.high if effect == "wheelbase" else p.neutral for p, effect in numbers])
-    first = Established(("wheelbase", "wheel-mismatch"), ("a term",), searched.problem, replace(searched.fit, values=at_bound))
-    second = Established(("wheel-mismatch",), ("another",), searched.problem, searched.fit)
+    first = Established(("wheelbase", "wheel-mismatch"), (term,), searched.problem, replace(searched.fit, values=at_bound))
+    second = Established(("wheel-mismatch",), (term,), searched.problem, searched.fit)
     asked = []
-    monkeypatch.setattr(beside_terms, "sought_terms", lambda selection, *_: (asked.append(selection.accepted), second)[1])
+    again = lambda selection, *given: (asked.append((selection.accepted, given[-1])), second)[1]  # noqa: E731
+    monkeypatch.setattr(beside_terms, "sought_terms", again)
     monkeypatch.setattr(beside_terms, "_without_negligible", lambda found, *_: found)
     stands = SimpleNamespace(selection=searched, rest=NOTHING)
     assert beside_terms.without_absurd(first, stands, predictor(), None) is second
-    assert asked == [("wheel-mismatch",)]
+    assert asked == [(("wheel-mismatch",), {"wheelbase"})]
     assert beside_terms.without_absurd(second, stands, predictor(), None) is second
+
+
+@pytest.mark.parametrize(
+    ("name", "signal", "factor", "gone"),
+    [
+        ("clock-offset", CHANGES, 4.0, True),
+        ("clock-offset", CHANGES, 1.5, False),
+        ("clock-offset", "place", 4.0, False),
+        ("wheelbase", CHANGES, 4.0, False),
+    ],
+)
+def test_a_shift_in_time_that_an_answer_to_past_commands_multiplies_is_a_part_of_that_answer(name, signal, factor, gone):
+    """Nothing tells when such an answer begins from when the command comes; other numbers are told as they are."""
+    searched = selected("wheelbase", "clock-offset")
+    at = next(i for i, number in enumerate(searched.fit.free) if number.effect == name)
+    neutral = searched.fit.free[at].parameter.neutral
+    without, beside = (searched.fit.values.copy() for _ in range(2))
+    without[at], beside[at] = neutral + 1e-3, neutral + factor * 1e-3
+    spread = np.zeros_like(searched.fit.covariance)
+    spread[at, at] = 1e-10
+    narrow = replace(searched.fit, covariance=spread, spans={})
+    term = SimpleNamespace(signal=signal)
+    found = Established(searched.accepted, (term,), searched.problem, replace(narrow, values=beside))
+    assert (name in beside_terms._absurd(found, replace(narrow, values=without))) is gone
+
 
 
 def test_with_a_term_in_the_model_an_effect_that_lowers_no_error_is_not_named():
