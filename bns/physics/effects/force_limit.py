@@ -51,6 +51,10 @@ EFFECT = Effect(
     "{turn_ratio:higher|lower}",
     measurement="weigh the robot with its load; log the wheels' own speeds (encoders) while a command changes, ahead and on "
     "the spot",
+    explained_by=("wheel_left_m_s", "wheel_right_m_s"),
+    caveat="force-limit: tyres that slip limit the robot's acceleration as weak motors do, on a straight line to their "
+    "coefficient of friction times 9.8 m/s^2. Log the wheels' own speeds (columns wheel_left_m_s and wheel_right_m_s): wheels "
+    "that slip turn faster than the robot drives.",
     apply=apply,
     needs="track",
     extends="acceleration-limit",
