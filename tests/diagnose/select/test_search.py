@@ -274,6 +274,8 @@ def test_what_could_stand_in_place_of_the_newest_effect_is_known_from_the_round_
         ({"z": 1.9}, False),
         ({"z": -3.0}, False),
         ({"p_value": 0.2}, False),
+        ({"p_value": 0.04}, False),  # taken, had not another one stood for it
+        ({"p_value": 0.04, "z": 2.4}, True),
         ({"elpd_diff": 0.4}, False),  # a decoy does better
         ({"losses": 1e4}, False),  # nothing beside what is lost anyway
         ({"rejected_because": "at its bound"}, False),
@@ -283,13 +285,15 @@ def test_what_could_stand_in_place_of_the_newest_effect_is_known_from_the_round_
     ],
 )
 def test_a_sign_is_worth_more_trials_only_where_few_nearly_sufficed(change, hinted):
-    given = {"z": 3.0, "p_value": 0.002, "elpd_diff": 1.0, "losses": 9.0, "rejected_because": "", "accepted": (), "trials": 12}
+    given = {"z": 3.0, "p_value": 0.1, "elpd_diff": 1.0, "losses": 9.0, "rejected_because": "", "accepted": (), "trials": 12}
     given["unexplained"] = False
     given |= change
     earned = SimpleNamespace(p_value=given["p_value"], z=given["z"], elpd_diff=given["elpd_diff"])
     candidate = SimpleNamespace(name="turn-slip", rejected_because=given["rejected_because"], paired_comparison=earned)
     nominal = SimpleNamespace(losses=np.full(12, given["losses"]))
-    found = SimpleNamespace(accepted=given["accepted"], steps=(SelectionStep((candidate,), 0.5, ""),), nominal=nominal)
+    of_wheels = SimpleNamespace(predictor=SimpleNamespace(luck=None))
+    steps = (SelectionStep((candidate,), 0.5, ""),)
+    found = SimpleNamespace(accepted=given["accepted"], steps=steps, nominal=nominal, problem=of_wheels)
     assert (diagnosing._hint(found, given["trials"], unexplained=given["unexplained"]) is candidate) is hinted
 
 
