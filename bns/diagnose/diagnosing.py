@@ -107,7 +107,7 @@ def _diagnosed(
     said, slight = said_of(found.terms, predictor), said_of(found.slight, predictor).sentences
     formula = formula_in_words(found.formula, predictor) if not found.terms else ""
     judged = {*found.withdrawn, *found.imitating, *found.negligible}
-    hint = _hint(found.selection, len(predictor.tracks), judged, left)
+    hint = _hint(found.selection, len(predictor.tracks), judged, left or found.slightly_left)
     longer = [names for names in pairs if names not in as_short]
     notes = [*notes_on(found, predictor.tracks, hint, longer, said.sentences, slight, formula)]
     verdict = _verdict(found.selection, left, hint)
@@ -203,14 +203,15 @@ def _verdict(selection: SelectionResult, unexplained: bool, hint: Candidate | No
 def _hint(
     selection: SelectionResult, trials: int, judged: Collection[str] = (), unexplained: bool = False
 ) -> Candidate | None:
-    """The best candidate of a search that accepted nothing, where few trials nearly sufficed; none that was ``judged``.
+    """The best candidate of a search that ends in nothing, where few trials nearly sufficed; none that was ``judged``.
 
-    None where something is left ``unexplained``: what no effect explains lifts many effects a little. Nor one that was certain
-    enough to be taken: another stood for it and was judged, as a late clock stands for a late command.
+    Of its last round, beside what it accepted and was judged then: without that, others imitate it. Nor one that was certain
+    enough to be taken: another stood for it and was judged, as a late clock stands for a late command. None where something is
+    left ``unexplained``, however slight: what no effect explains lifts many effects a little.
     """
     if unexplained or selection.accepted or trials >= FEW_TRIALS:
         return None
-    step, least = selection.steps[0], MIN_GAIN * float(selection.nominal.losses.mean())
+    step, least = selection.steps[-1], MIN_GAIN * float(selection.nominal.losses.mean())
     level = _HINT * FALSE_ALARM / step.candidates
     least_z = MIN_Z if selection.problem.predictor.luck is None else MIN_Z_STRETCHES
     near = [

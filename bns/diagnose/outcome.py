@@ -76,6 +76,11 @@ class Outcome:
         return bool(self.withdrawn or self.imitating or self.negligible)
 
     @property
+    def slightly_left(self) -> bool:
+        """Is something certainly left that does not count?"""
+        return bool(self.unseen or self.slight or self.slight_along)
+
+    @property
     def own_clocks(self) -> bool:
         """Has each trial a clock of its own?"""
         return self.selection.fit.model.per_trial_effect is not None

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.diagnose import beside_terms, caveats, effect_caveats, outcome, standing
+from bns.diagnose import beside_terms, caveats, diagnosing, effect_caveats, outcome, standing
 from bns.diagnose.caveats import notes_on
 from bns.diagnose.data.tracks import tracks_of
 from bns.diagnose.diagnosing import diagnose
@@ -128,6 +128,17 @@ def test_a_diagnosis_says_what_is_negligible(monkeypatch):
     assert {a.effect.name for a in found.model.effects} == set(found.effects)
 
 
+@pytest.mark.parametrize("slightly", [True, False])
+def test_what_is_left_is_no_sign_of_an_effect_however_slight_it_is(monkeypatch, slightly):
+    """A ridge that moves the robot by less than the tracker's noise makes many effects nearly certain."""
+    given = []
+    monkeypatch.setattr(outcome.Outcome, "slightly_left", slightly)
+    monkeypatch.setattr(diagnosing, "_hint", lambda *all_of: given.append(all_of[3]))
+    table = measured(NOMINAL, trials=16, seed=3)
+    diagnose(WheelPredictor(tracks_of(table)), NOMINAL, barred=all_but_rivals_of("wheelbase"))
+    assert given == [slightly]
+
+
 @pytest.mark.parametrize(("matters", "named"), [(True, ("wheelbase",)), (False, ("wheelbase", "wheel-mismatch"))])
 def test_effects_give_way_only_to_terms_that_matter(monkeypatch, matters, named):
     """The search with flexible terms and its judgement are mocked: the search keeps one effect beside a term."""
@@ -163,6 +174,7 @@ def test_what_terms_describe_wholly_counts_only_if_it_matters(monkeypatch, matte
     assert ended.selection.accepted == ("wheelbase",)
     assert (ended.terms, ended.slight) == ((("a term",), ()) if matters else ((), ("a term",)))
     assert ended.rest == (left if matters else NOTHING)
+    assert ended.slightly_left is not matters
     if not matters:
         said = notes_on(replace(ended, terms=()), predictor().tracks, None, slight=["slower for two seconds"])
         assert next(said).startswith("What is left is certain but slight: slower for two seconds.")

@@ -420,3 +420,14 @@ def test_a_search_looks_ahead_to_all_effects_that_would_come_in():
     problem, fit = search._refit_with_noise(NOMINAL.with_effect("speed-gain", gain=0.95))
     ahead = search._forwards._looked_ahead(problem, fit, ("speed-gain",))
     assert {active.effect.name for active in ahead.effects} == {"speed-gain", "wheelbase", "motor-lag"}
+
+
+@pytest.mark.parametrize("last", [True, False])
+def test_a_sign_is_sought_beside_what_a_search_accepted_though_that_is_negligible(last):
+    """A clock that is 10 ms late is taken and lowers no error; beside it, play in the gears earns nothing more."""
+    near, none = SimpleNamespace(p_value=0.1, z=3.0, elpd_diff=1.0), SimpleNamespace(p_value=0.5, z=0.2, elpd_diff=0.0)
+    candidate, nothing = (SimpleNamespace(name="backlash", rejected_because="", paired_comparison=e) for e in (near, none))
+    rounds = [SelectionStep((one,), 0.5, "") for one in ((nothing, candidate) if last else (candidate, nothing))]
+    problem = SimpleNamespace(predictor=SimpleNamespace(luck=None))
+    found = SimpleNamespace(accepted=(), steps=tuple(rounds), nominal=SimpleNamespace(losses=np.full(12, 9.0)), problem=problem)
+    assert (diagnosing._hint(found, 12, {"clock-offset"}) is candidate) is last
