@@ -50,6 +50,7 @@ VALUES: dict[str, dict[str, float]] = {
     "wheel-patch": {"x_m": 0.35, "y_m": 0.0, "radius_m": 0.12, "loss": 0.3, "apart_share": 1.0},
     "floor-slope": {"x_m_s": 0.0, "y_m_s": -0.01},
     "force-limit": {"max_m_s2": 0.15, "turn_ratio": 4.0},
+    "traction-limit": {"max_m_s2": 0.15, "turn_ratio": 4.0},
     "wheel-diameters": {"ratio": 0.9},
     "velocity-ramp": {"forward_m_s2": 0.1, "turn_rad_s2": 1.5},
     "heading-delay": {"delay_s": 0.4},

@@ -45,6 +45,7 @@ ORDER = (
     "gear-friction",
     "scrub-friction",
     "controller-overshoot",
+    "traction-limit",
     "sliding-contact",
     "heating",  # by the work that the wheels really do
     "wheel-diameters",

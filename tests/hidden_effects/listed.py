@@ -35,6 +35,7 @@ from tests.hidden_effects.listed_loads import (
     SlidingContact,
     SlopeLoad,
     TetherLoad,
+    TractionLimit,
     VelocityRamp,
 )
 from tests.hidden_effects.listed_motors import (
@@ -423,6 +424,7 @@ LISTED: dict[str, type[Cause]] = {
     "scrub-friction": ScrubFriction,
     "sliding-contact": SlidingContact,
     "controller-overshoot": ControllerOvershoot,
+    "traction-limit": TractionLimit,
     "heating": Heating,
     "wheel-diameters": WheelDiameters,
     "wheel-eccentricity": WheelEccentricity,

@@ -44,6 +44,29 @@ class ForceLimit(Cause):
 
 
 @dataclass
+class TractionLimit(Cause):
+    """A body on two tyres that push it with what their slip calls for, up to the friction of each."""
+
+    max_m_s2: float
+    turn_ratio: float
+    stiff_s = 1e-3
+
+    def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
+        small_s = moment.step_s / FINE
+        out, now = np.empty_like(wheels), np.zeros_like(wheels[:, 0])
+        for i in range(wheels.shape[1]):
+            way = np.zeros_like(now)
+            for _ in range(FINE):
+                push = np.clip((wheels[:, i] - now) / self.stiff_s, -self.max_m_s2, self.max_m_s2)
+                ahead, spin = push.mean(axis=1), (push[:, 1] - push[:, 0]) / 2 * self.turn_ratio
+                after = now + np.stack([ahead - spin, ahead + spin], axis=1) * small_s
+                way += (now + after) / 2 * small_s
+                now = after
+            out[:, i] = way / moment.step_s
+        return out
+
+
+@dataclass
 class MassOffset(Cause):
     """A body whose centre of mass lies off the axle, between stiff springs of speed: forces in small parts of a step."""
 

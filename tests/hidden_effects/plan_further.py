@@ -89,6 +89,7 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
         {"per_m2": 0.08, "x_m": 0.7, "y_m": 0.4},
     ),
     "force-limit": ({"max_m_s2": 0.4, "turn_ratio": 2.5}, {"max_m_s2": 0.2, "turn_ratio": 4.0}),
+    "traction-limit": ({"max_m_s2": 0.4, "turn_ratio": 2.0}, {"max_m_s2": 0.2, "turn_ratio": 1.5}),
     "velocity-ramp": (
         {"forward_m_s2": 0.3, "turn_rad_s2": 8.0},
         {"forward_m_s2": 0.15, "turn_rad_s2": 3.0},
@@ -131,8 +132,13 @@ LONGER: dict[str, tuple[Parameters, Parameters]] = {
     "supply-trip": ({"step_m_s": 0.3, "off_s": 0.15}, {"step_m_s": 0.2, "off_s": 0.4}),
 }
 """Medium and strong, of the Khepera."""
-BESIDE: dict[str, dict[str, Parameters]] = {"wheel-diameters": {"acceleration-limit": {"max_m_s2": 0.25}}}
-"""What an effect needs beside it to differ from a simpler one: without limits, diameters are a mismatch of commands."""
+BESIDE: dict[str, dict[str, Parameters]] = {
+    "wheel-diameters": {"acceleration-limit": {"max_m_s2": 0.25}},
+    "traction-limit": {"motor-lag": {"tau_s": 0.15}},
+}
+"""What an effect needs beside it to differ from a simpler one: without limits, diameters are a mismatch of commands.
+
+Without a lag, tyres limit what motors do."""
 ALIKE = {
     "caster-swing": ("caster-trail",),
     "caster-trail": ("caster-swing",),
@@ -146,6 +152,7 @@ ALIKE = {
     "wheel-diameters": ("wheel-mismatch",),
     "overload-trip": ("supply-trip",),
     "supply-trip": ("overload-trip",),
+    "traction-limit": ("force-limit", "acceleration-limit"),
 }
 """What would stand in for an effect that is taken out: a slope is a cable from far away, and one patch contains another."""
 TURNING = {
