@@ -18,7 +18,7 @@ from bns.physics.signals import Array, Wheels
 from bns.physics.wheels.scans import limited_together
 
 PARTS = 4
-"""Of a step; in each the wheels' speed is taken as constant, which makes the robot a little late on a slow ramp."""
+"""Of a step, in each of which the wheels' speed is taken as constant."""
 
 
 def apply(wheels: Wheels, max_m_s2: float, turn_ratio: float) -> Wheels:
@@ -29,12 +29,15 @@ def apply(wheels: Wheels, max_m_s2: float, turn_ratio: float) -> Wheels:
     if wheels.followed is None:  # nothing lags: commands, which are constant in a step
         return wheels.turning(*limited_together(wheels.left_m_s, wheels.right_m_s, wheels.step_s, *limits))
     step_s = np.repeat(wheels.step_s / PARTS, PARTS, axis=-1)
-    left, right = (_in_parts(side, wheels.step_s) for side in (wheels.left_m_s, wheels.right_m_s))
-    return wheels.turning(*(_mean(side) for side in limited_together(left, right, step_s, *limits)))
+    both = [_in_parts(side, wheels.step_s) for side in (wheels.left_m_s, wheels.right_m_s)]
+    (_, left_m_s2), (_, right_m_s2) = both
+    allowed = _allowed(left_m_s2 * right_m_s2, *limits)
+    told = (side + _ahead(rise, allowed, step_s) for side, rise in both)
+    return wheels.turning(*(_mean(side) for side in limited_together(*told, step_s, *limits)))
 
 
-def _in_parts(speed_m_s: Array, step_s: Array) -> Array:
-    """Speeds in the parts of steps, (batch, PARTS·steps), along a line through each step, with its mean.
+def _in_parts(speed_m_s: Array, step_s: Array) -> tuple[Array, Array]:
+    """Speeds in the parts of steps, (batch, PARTS·steps), along a line through each step, with its mean; and how steep each is.
 
     As steep as towards the nearer of its neighbours, and level where one lies above and one below (`minmod`: van Leer 1979, J.
     Comput. Phys. 32:101, doi:10.1016/0021-9991(79)90145-1): so a jump of a command stays a jump, and a ramp a ramp.
@@ -45,7 +48,20 @@ def _in_parts(speed_m_s: Array, step_s: Array) -> Array:
     before, after = rise[..., :-1], rise[..., 1:]
     slope = np.where(before * after > 0.0, np.sign(before) * np.minimum(np.abs(before), np.abs(after)), 0.0)
     parts: Array = speed_m_s[..., None] + (slope * step_s)[..., None] * share
-    return parts.reshape(*speed_m_s.shape[:-1], -1)
+    return parts.reshape(*speed_m_s.shape[:-1], -1), np.repeat(slope, PARTS, axis=-1)
+
+
+def _allowed(together: Array, straight: float, turning: float) -> Array:
+    """The limit of a wheel's acceleration, by the product of those of both (m/s^2), as `limited_together` has it."""
+    alone = 2.0 * straight * turning / (straight + turning)
+    out: Array = np.where(together > 0.0, straight, np.where(together < 0.0, turning, alone))
+    return out
+
+
+def _ahead(rise_m_s2: Array, allowed_m_s2: Array, step_s: Array) -> Array:
+    """By how much a part is told more than its mean: what is told at once is reached as late as the limit has it."""
+    out: Array = rise_m_s2 * np.minimum(np.abs(rise_m_s2) / allowed_m_s2, 1.0) * step_s / 2.0
+    return out
 
 
 def _mean(parts: Array) -> Array:

@@ -128,7 +128,7 @@ def test_without_limits_diameters_are_a_mismatch_and_no_tie():
 
 def test_an_effect_is_a_variant_if_it_has_no_parameters_of_its_own():
     catalogue = all_effects()
-    assert [name for name in catalogue if extending.variant(catalogue, name)] == ["wheel-diameters"]
+    assert [name for name in catalogue if extending.variant(catalogue, name)] == ["traction-limit", "wheel-diameters"]
     before, after = (SimpleNamespace(held_out=np.array(losses)) for losses in ((5.0, 9.0), (5.0, 5.9)))
     assert extending.fits_better(before, after)
     assert not extending.fits_better(before, SimpleNamespace(held_out=np.array((5.0, 6.1))))
