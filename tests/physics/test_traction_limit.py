@@ -38,12 +38,20 @@ def in_small_steps(wheels, tau_s):
     return out
 
 
+FAST = ((0.2, 0.2), (0.05, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.0, 0.0))
+SLOW = ((0.1, 0.1), (0.05, 0.1), (0.1, 0.05), (0.08, 0.1), (0.0, 0.0))
+"""The first command is at the limit for a moment only."""
+
+
+@pytest.mark.parametrize("commands", [FAST, SLOW])
 @pytest.mark.parametrize("tau_s", [0.0, TAU_S])
-def test_the_robot_follows_its_wheels_as_fast_as_friction_lets_it(tau_s):
-    wheels = told((0.2, 0.2), (0.05, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.0, 0.0))
+def test_the_robot_follows_its_wheels_as_fast_as_friction_lets_it(tau_s, commands):
+    wheels = told(*commands)
     way_mm = 1e3 * STEP_S * np.cumsum(acted(wheels, tau_s) - in_small_steps(wheels, tau_s), axis=1)
     assert np.abs(way_mm).max() < 0.25  # of 100 mm in each command
-    assert 1e3 * STEP_S * np.abs(acted(wheels, tau_s) - in_small_steps(told((0.2, 0.2)), tau_s)[:, :1]).max() > 5.0
+    late = effect_named("motor-lag").apply(wheels, tau_s=tau_s) if tau_s else wheels
+    unlimited = np.stack([late.left_m_s[0], late.right_m_s[0]])
+    assert 1e3 * STEP_S * np.abs(np.cumsum(acted(wheels, tau_s) - unlimited, axis=1)).max() > (1.0 if commands is FAST else 0.1)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0, 0.0])

@@ -39,14 +39,16 @@ def apply(wheels: Wheels, max_m_s2: float, turn_ratio: float) -> Wheels:
 def _in_parts(speed_m_s: Array, step_s: Array) -> tuple[Array, Array]:
     """Speeds in the parts of steps, (batch, PARTS·steps), along a line through each step, with its mean; and how steep each is.
 
-    As steep as towards the nearer of its neighbours, and level where one lies above and one below (`minmod`: van Leer 1979, J.
-    Comput. Phys. 32:101, doi:10.1016/0021-9991(79)90145-1): so a jump of a command stays a jump, and a ramp a ramp.
+    As steep as from one neighbour to the other, at most twice as steep as towards either, and level where one lies above and one
+    below (van Leer 1977, J. Comput. Phys. 23:276, doi:10.1016/0021-9991(77)90095-X): a jump stays a jump, and a ramp a ramp.
     """
     share = (np.arange(PARTS) + 0.5) / PARTS - 0.5
     between_s = np.maximum(step_s[..., 1:] + step_s[..., :-1], 1e-12) / 2.0
-    rise = np.pad(np.diff(speed_m_s, axis=-1) / between_s, [(0, 0)] * (speed_m_s.ndim - 1) + [(1, 1)])
+    begun = speed_m_s[..., :1] / np.maximum(step_s[..., :1], 1e-12)  # from rest
+    rise = np.concatenate([begun, np.diff(speed_m_s, axis=-1) / between_s, np.zeros_like(begun)], axis=-1)
     before, after = rise[..., :-1], rise[..., 1:]
-    slope = np.where(before * after > 0.0, np.sign(before) * np.minimum(np.abs(before), np.abs(after)), 0.0)
+    steep = np.minimum(2.0 * np.minimum(np.abs(before), np.abs(after)), np.abs(before + after) / 2.0)
+    slope = np.where(before * after > 0.0, np.sign(before) * steep, 0.0)
     parts: Array = speed_m_s[..., None] + (slope * step_s)[..., None] * share
     return parts.reshape(*speed_m_s.shape[:-1], -1), np.repeat(slope, PARTS, axis=-1)
 
