@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from bns.physics.effects import effect_named
+from bns.physics.effects.traction_limit import PARTS, _in_parts
 from bns.physics.signals import Conditions, Wheels
 
 STEP_S, FINE_S = 0.04, 1e-4
@@ -68,3 +69,21 @@ def test_without_a_lag_it_is_a_limit_of_force():
     wheels = told((0.2, 0.1), (0.0, 0.2))
     forced = effect_named("force-limit").apply(wheels, max_m_s2=LIMIT_M_S2, turn_ratio=RATIO)
     assert acted(wheels, 0.0) == pytest.approx(np.stack([forced.left_m_s[0], forced.right_m_s[0]]))
+
+
+@pytest.mark.parametrize(
+    ("steps", "steep"),
+    [
+        ((0.1, 0.1, 0.2, 0.2), (0.0, 0.0)),  # a jump
+        ((0.1, 0.1, 0.2, 0.25), (0.0, 0.075)),  # and what follows it
+        ((0.1, 0.3, 0.2, 0.2), (0.0, 0.0)),  # a peak
+        ((0.1, 0.2, 0.3, 0.4), (0.1, 0.1)),  # a ramp
+        ((0.1, 0.12, 0.3, 0.32), (0.04, 0.04)),
+    ],
+)
+def test_a_jump_stays_a_jump_and_a_ramp_a_ramp(steps, steep):
+    """By how much the speed changes within the second and the third step; each keeps its mean."""
+    parts, _ = _in_parts(np.array([steps]), np.full((1, 4), STEP_S))
+    each = parts.reshape(4, PARTS)
+    assert each.mean(axis=1) == pytest.approx(steps)
+    assert np.diff(each, axis=1).mean(axis=1)[1:3] * PARTS == pytest.approx(steep, abs=1e-12)
