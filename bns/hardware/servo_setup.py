@@ -57,6 +57,11 @@ def rates(protocols: Sequence[int] = PROTOCOLS, every: bool = False) -> list[Rat
     return list(dict.fromkeys(usual + others))
 
 
+def _others(looked: Sequence[Rate]) -> list[Rate]:
+    """All rates of those protocols at which nobody has looked yet."""
+    return [rate for rate in rates(sorted({rate.protocol for rate in looked}), every=True) if rate not in looked]
+
+
 class OnTheBus(NamedTuple):
     """A number at which something answers; `model` is 0 where the answer is garbled, or comes twice, as by two servos of the same
     number, and `MUTE` where a ping is answered and nothing else: at status return level 0 (control tables: AX-12A, address 16; X
@@ -152,15 +157,32 @@ class ServoBus:
         number `old`)."""
         if not 0 <= new <= _LAST_ID:
             raise HardwareError(f"the id {new} is none; ids go from 0 to {_LAST_ID}.")
+        looked = rates() if looked is None else looked
         there = list(self.scan(looked))
+        if old is not None and all(servo.number != old for servo in there):
+            there += self.scan(_others(looked), sorted({old, new}))
         meant = [servo for servo in there if old is None or servo.number == old]
+        if not there:
+            raise HardwareError(
+                f"no servo answers{'' if old is None else f', and none has the id {old} at another rate'}. Is the supply on, is "
+                "the cable connected? One at another rate: bns servos scan --all-bauds finds it, --from ID takes it from there."
+            )
         if len(meant) != 1 or not meant[0].model:
-            listed = "; ".join(str(servo) for servo in there) or "no servo answers"
             which = "Connect one servo alone" if old is None else f"No single servo has the id {old}"
-            raise HardwareError(f"{which}: {listed}. Name one of several with --from ID.")
+            raise HardwareError(f"{which}: {'; '.join(map(str, there))}. Name one of several with --from ID.")
         (servo,) = (self.unmuted(one) if one.mute else one for one in meant)
-        if any(other.number == new for other in there if other is not servo):
+        if any(other.number == new for other in there if other is not meant[0]):
             raise HardwareError(f"another servo on this bus has the id {new}; take a free one, or connect one servo alone.")
+        try:
+            return self._numbered(servo, new)
+        except HardwareError as error:
+            raise HardwareError(
+                f"{error} The servo may have the id {new} by now, or still {servo.number}: switch it off and on, "
+                "then bns servos scan tells."
+            ) from error
+
+    def _numbered(self, servo: OnTheBus, new: int) -> OnTheBus:
+        """Its number and rate written, and seen to be so."""
         if new != servo.number:
             self.write(servo, "id", new)
             servo = servo._replace(number=new)
@@ -168,7 +190,7 @@ class ServoBus:
             self.write(servo, "baud_rate", servo.table.bauds[BAUD])
         found = list(self.scan([Rate(BAUD, servo.protocol)], [new]))
         if len(found) != 1 or not found[0].model:
-            raise HardwareError(f"the servo does not answer as {new}; switch it off and on, then: bns servos scan")
+            raise HardwareError(f"no single servo answers as {new}.")
         return found[0]
 
     def check(self, servo: OnTheBus) -> Iterator[Finding]:
@@ -270,7 +292,8 @@ class ServoBus:
         """Write a register and read it back: whether a servo confirms a write depends on what is being set."""
         table = servo.table or AX12
         address, size = table.span(name, name)
-        if address < table.locked_below and self.read(servo, "torque_enable"):
+        # X series take settings only so; an AX-12 that leaves wheel mode would turn to an old goal as fast as it can
+        if address < table.registers["torque_enable"].address and self.read(servo, "torque_enable"):
             self.write(servo, "torque_enable", 0)
         data = list(value.to_bytes(size, "little"))
         self.at(servo.baud)

@@ -22,6 +22,9 @@ with extra("robot"):
 
 FEWEST_VIEWS, FEWEST_CORNERS = 8, 8
 WORST_RMS_PX = 1.0
+LEAST_TILT = np.radians(15.0)
+"""Views that differ in tilt by less fit many lenses equally well: rendered ones without tilt, one of a third of the length."""
+_WORST_FLOOR_M = 0.01
 _FINE_PX = (1280, 720)
 _WRONG_SCALE = 0.005
 
@@ -163,14 +166,36 @@ def calibrate(
             "(--size) show it from further away."
         )
     height, width = frames[0].shape[:2]
-    rms, matrix, distortion, _, _ = cv2.calibrateCamera(
+    for floor in floors:
+        if floor.shape[:2] != (height, width):
+            raise HardwareError(
+                f"a picture of the floor has {floor.shape[1]} x {floor.shape[0]} pixels, the views have {width} x {height}: "
+                "take all of them with the same camera in the same mode."
+            )
+    rms, matrix, distortion, turns, _ = cv2.calibrateCamera(
         [p for p, _ in seen], [p for _, p in seen], (width, height), None, None
     )
     if not rms <= WORST_RMS_PX:
         raise HardwareError(f"the calibration fits badly (RMS {rms:.2f} pixels); is the board flat, the focus fixed?")
+    if (tilt := _most_tilt(turns)) < LEAST_TILT:
+        raise HardwareError(
+            f"the views of the board differ in tilt by {math.degrees(tilt):.0f} degrees at most; those that differ by less "
+            f"than {math.degrees(LEAST_TILT):.0f} fit many lenses. Film it again, tilted by 20 to 40 degrees to all four sides."
+        )
     flat = np.asarray(distortion, np.float64).ravel()[:5]
     pose = floor_pose([_laid(frame, board) for frame in floors], np.asarray(matrix), flat, (width, height))
+    if pose.rms_m > _WORST_FLOOR_M:
+        raise HardwareError(
+            f"corners of the board on the floor that were kept back are off by {1000 * pose.rms_m:.0f} mm RMS, more than "
+            f"{1000 * _WORST_FLOOR_M:.0f}: is the board flat, did the camera stay as it was? Film again, in all of the picture."
+        )
     return Calibration(pose.lens, float(rms), len(seen), camera, len(floors), pose.rms_m, pose.worst_m, picture or {})
+
+
+def _most_tilt(turns: Sequence[np.ndarray]) -> float:
+    """The greatest angle between the planes of two views, by how the board was turned in each."""
+    normals = np.array([cv2.Rodrigues(turn)[0][:, 2] for turn in turns])
+    return float(np.arccos(np.clip(normals @ normals.T, -1.0, 1.0)).max())
 
 
 def _laid(frame: np.ndarray, board: Board) -> Corners:

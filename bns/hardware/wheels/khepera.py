@@ -36,6 +36,8 @@ WHEELBASE_M = 0.0884
 LOWEST_UNITS, HIGHEST_UNITS = 2_000, 43_000
 """Ends of the range that the firmware regulates; that of firmware 3 and later is not published."""
 FLAT_V = 6.0
+_MARK_PULSES = 5_000_000
+"""150 m and more: further than a drive goes, and far from where counters of 32 bits begin again."""
 _SPEEDS = r"e,(-?\d+),(-?\d+)"
 
 
@@ -76,7 +78,7 @@ class KheperaIII:
     """Driver. Opening asks for the firmware and the battery and makes sure that the wheels stand still."""
 
     counts_from_its_start = True
-    """Its counters of the wheels' ways are at zero when it starts."""
+    """Its counters of the wheels' ways are at zero when it starts, so that it is found to have restarted."""
 
     def __init__(self, link: Exchange, clock: Clock, journal: HardwareLog, stop_s: float = 5.0) -> None:
         self._link, self._clock, self._journal, self._stop_s = link, clock, journal, stop_s
@@ -116,6 +118,10 @@ class KheperaIII:
         """Way of the wheels' surfaces since the counters were last set, m."""
         left, right = self._ask(b"R", r"r,(-?\d+),(-?\d+)")
         return int(left) * self.firmware.m_per_pulse, int(right) * self.firmware.m_per_pulse
+
+    def mark_encoders(self) -> None:
+        """Set the counters far from zero, where they begin again when it restarts."""
+        self._ask(b"I,l%d,l%d" % (_MARK_PULSES, _MARK_PULSES), "i")
 
     def battery_v(self) -> float:
         """Voltage of the battery."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -24,6 +25,8 @@ from bns.hardware.wheels.wheel_drive import RobotLostError, WheelDrive
 
 _AT_ZERO_M, _TURNED_M, _OFF_SHARE = 0.01, 0.05, 0.05
 """Counters so near zero have begun again where wheels must be further from there, by more than orders may be off."""
+_NEAR_ZERO_M = 50.0
+"""Counters nearer to zero are set anew before a drive, which is not expected to go so far."""
 _RESTARTED = (
     "the robot has restarted during the drive: its counters of the wheels began again at zero. Its battery is low, worn or "
     "loose, or its switch was touched: charge it, see that it sits firmly"
@@ -148,7 +151,7 @@ class WheeledPlatform:
         agreement = Agreement(self._disagree_s, self._wheels.wheelbase_m)
         often = self._wheels.heartbeat_looks
         drive = WheelDrive(self._driver, self._eye, self._watch, agreement, self._clock, self._journal, start, often)
-        ended, before_m = "", self._counted()
+        ended, before_m = "", self._marked()
         drive.doubt = lambda: self._check_restarted(before_m, drive)
         guard = StopsAtTheEnd(self.stop, self._asked)
         began_s = self._clock.now_s()
@@ -194,6 +197,15 @@ class WheeledPlatform:
             return np.array(self._driver.encoders_m())
         except RobotLostError:
             return None
+
+    def _marked(self) -> np.ndarray | None:
+        """The same before a drive: counters near zero are set far from there, else a restart soon after could not be seen."""
+        counted_m, mark = self._counted(), getattr(self._driver, "mark_encoders", None)
+        if counted_m is None or mark is None or np.abs(counted_m).min() > _NEAR_ZERO_M:
+            return counted_m
+        with suppress(RobotLostError):  # then they stay as they are
+            mark()
+        return self._counted()
 
     def _check_restarted(self, before_m: np.ndarray | None, drive: WheelDrive, error: Exception | None = None) -> None:
         """TrialPausedError if the counters, at ``before_m`` when the drive began, have begun again since: they leapt, or are at

@@ -127,6 +127,56 @@ def test_a_new_servo_gets_its_id(bus, capsys):
     assert said.out == "id 7 at 1000000 baud: AX-12\n"
 
 
+@pytest.mark.parametrize("asked", [("set-id", 7), ("check", "--fix")], ids=["set-id", "check"])
+def test_settings_are_written_with_the_torque_off(bus, capsys, monkeypatch, asked):
+    """An AX-12 that leaves wheel mode with its torque on turns to whatever goal it was given last, as fast as it can."""
+    (servo,), port = bus(1, cw_angle_limit=0, ccw_angle_limit=0, goal_position=900, torque_enable=1)
+    written, write = [], Servo.write
+
+    def noted(self, address, data):
+        written.append((address, self.get("torque_enable")))
+        return write(self, address, data)
+
+    monkeypatch.setattr(Servo, "write", noted)
+    call(capsys, *asked, "--protocol", 1, "--port", port)
+    settings = [torque for address, torque in written if address < AX12.registers["torque_enable"].address]
+    assert settings
+    assert not any(settings)
+    assert servo.get("torque_enable") == 0
+
+
+def test_a_number_that_was_written_and_not_seen_is_told(bus, capsys, monkeypatch):
+    (servo,), port = bus(1)
+    write = Servo.write
+
+    def cut_off(self, address, data):
+        self.put("status_return", 0)  # it answers no reading any more
+        return write(self, address, data)
+
+    monkeypatch.setattr(Servo, "write", cut_off)
+    code, said = call(capsys, "set-id", 7, "--protocol", 1, "--port", port)
+    assert (code, servo.get("id")) == (2, 7)
+    assert "servo 7 does not answer" in said.err
+    assert "The servo may have the id 7 by now, or still 1: switch it off and on, then bns servos scan tells." in said.err
+
+
+def test_nobody_to_be_numbered_is_said_to_be_nobody(bus, capsys):
+    _, port = bus()
+    code, said = call(capsys, "set-id", 7, "--port", port)
+    assert code == 2
+    assert "no servo answers. Is the supply on" in said.err
+    code, said = call(capsys, "set-id", 7, "--from", 3, "--port", port)
+    assert code == 2
+    assert "no servo answers, and none has the id 3 at another rate." in said.err
+
+
+def test_a_mute_servo_may_keep_its_number(bus, capsys):
+    (servo,), port = bus(5)
+    servo.put("status_return", 0)
+    assert call(capsys, "set-id", 5, "--port", port)[0] == 0
+    assert servo.get("status_return") == 2
+
+
 def test_ids_that_cannot_be_given(bus, capsys):
     servos, port = bus(1, 2)
     for asked, message in (

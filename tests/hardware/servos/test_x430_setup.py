@@ -11,6 +11,7 @@ from bns.hardware.emulators.devices.bus import Bus
 from bns.hardware.emulators.devices.servo import Servo
 from bns.hardware.emulators.devices.terminal import PseudoTerminal
 from bns.hardware.emulators.faults import Faults
+from bns.hardware.servos.ax12_table import AX12
 from bns.hardware.servos.packets import BROADCAST
 from bns.hardware.servos.x430_table import XL430_W250, XM430_W350
 
@@ -30,7 +31,7 @@ def bus(tmp_path, monkeypatch):
     def build(*servos):
         found = Bus(servos, clock)
         opened.append(PseudoTerminal(found, tmp_path, "servos"))
-        found.baud = opened[-1].baud
+        found.baud = lambda: opened[-1].baud() or 1  # at a rate without a name nobody answers
         return str(opened[-1].path)
 
     build.clock = clock
@@ -82,6 +83,17 @@ def test_a_new_servo_gets_its_id_and_the_rate_of_a_chain(bus, capsys):
     code, said = call(capsys, "set-id", 7, "--port", bus(servo))
     assert (code, said.out) == (0, "id 7 at 1000000 baud: XL430-W250\n")
     assert [servo.get(name) for name in ("id", "baud_rate", "torque_enable")] == [7, 3, 0]
+
+
+def test_a_servo_of_any_rate_is_taken_from_there_by_its_number(bus, capsys):
+    servo = Servo(4, bus.clock, Faults(), baud_rate=AX12.bauds[57_600])
+    port = bus(servo)
+    code, said = call(capsys, "set-id", 7, "--protocol", 1, "--port", port)
+    assert code == 2
+    assert "One at another rate: bns servos scan --all-bauds finds it, --from ID takes it from there." in said.err
+    code, said = call(capsys, "set-id", 7, "--from", 4, "--protocol", 1, "--port", port)
+    assert (code, said.out, said.err) == (0, "id 7 at 1000000 baud: AX-12\n", "")
+    assert (servo.get("id"), servo.get("baud_rate")) == (7, AX12.bauds[1_000_000])
 
 
 def test_check_names_what_is_not_fit_and_mends_it(bus, capsys):

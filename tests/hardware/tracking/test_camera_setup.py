@@ -62,6 +62,44 @@ def test_the_floor_from_three_places(high_up):
     assert off_on_the_floor_m(three.lens, true) < off_on_the_floor_m(one.lens, true)
 
 
+def test_views_without_tilt_are_refused(high_up):
+    """They fit well, to a lens of a third of the focal length under a camera of a third of the height."""
+    lens, _, floors = high_up
+    room, board, draw = Scene(lens, seed=4), Board(), np.random.default_rng(3)
+    texture = cv2.cvtColor(board.picture(2500), cv2.COLOR_GRAY2BGR)
+    held = []
+    for _ in range(9):
+        turn, _ = cv2.Rodrigues(np.array([0.0, 0.0, draw.uniform(-0.4, 0.4)]))
+        place = np.array([*draw.uniform([-0.2, -0.1], [0.2, 0.1]), 1.1])
+        everywhere = np.full(texture.shape[:2], 255, np.uint8)
+        held.append(room.frame([Patch(texture, everywhere, board.size_m[0], turn, place)]))
+    with pytest.raises(HardwareError, match=r"differ in tilt by [0-3] degrees at most; .*less than 15 .*tilted by 20 to 40"):
+        calibrate(held, floors, board, "high")
+    with pytest.raises(HardwareError, match=r"differ in tilt by 0 degrees at most"):
+        calibrate(held[:1] * 9, floors, board, "high")
+
+
+def test_a_floor_of_another_size_is_refused(high_up):
+    _, held, floors = high_up
+    taller = cv2.copyMakeBorder(floors[0], 120, 120, 0, 0, cv2.BORDER_REPLICATE)
+    with pytest.raises(HardwareError, match=r"picture of the floor has 1280 x 960 pixels, the views have 1280 x 720"):
+        calibrate(held, [taller], Board(), "high")
+
+
+def test_a_floor_that_does_not_fit_is_refused(high_up, monkeypatch):
+    _, held, floors = high_up
+
+    def bent(frame, board):
+        view = _laid(frame, board)
+        px = view.px.copy()
+        px[3::4] += 40.0
+        return Corners(view.board_m, px)
+
+    monkeypatch.setattr("bns.hardware.tracking.calibration._laid", bent)
+    with pytest.raises(HardwareError, match=r"kept back are off by \d+ mm RMS, more than 10: is the board flat"):
+        calibrate(held, floors, Board(), "high")
+
+
 def test_kept_back_corners_have_no_part_in_the_floor(high_up):
     true, _, floors = high_up
     seen = [_laid(frame, Board()) for frame in floors]

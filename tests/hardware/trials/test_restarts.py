@@ -24,6 +24,19 @@ def test_a_restart_is_told_as_such_and_its_drive_is_not_kept(tmp_path, capsys, s
     assert len(past_evaluations(journal_of(tmp_path))) == 2
 
 
+@pytest.mark.parametrize("after_s", [0.05, 0.4, 0.8])
+def test_a_restart_soon_after_the_first_drive_began_is_seen(tmp_path, capsys, after_s):
+    """Its counters were at zero before, too, and the next command has it drive on at once."""
+    drives = tmp_path / "commands.csv"
+    drives.write_text("trial,left_m_s,right_m_s,duration_s\n" + "1,0.06,0.1,0.3\n" * 4 + "1,0.06,0.1,2\n")
+    asked = ["trial", "--robot", "khepera", "--emulated", "--yes", "--speed", "inf", "--commands", drives]
+    assert call(*asked, "--results", tmp_path / "first") == 0
+    began_s = next(iter(events(journal_of(tmp_path / "first"), "command")))["t_s"]
+    plan = faults(tmp_path, {"kind": "brown-out", "at_s": began_s + after_s, "for_s": 0.001})
+    assert call(*asked, "--results", tmp_path / "second", *plan) == 3
+    assert "the robot has restarted during the drive: its counters of the wheels began again at zero" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("kind", ["hang-up", "bus-fault"])
 def test_a_robot_that_was_away_has_not_restarted(tmp_path, capsys, kind):
     drives = tmp_path / "commands.csv"
