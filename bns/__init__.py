@@ -129,10 +129,20 @@ class _CallableRoom(ModuleType):
 
     @property
     def __signature__(self) -> Signature:
-        """What `help` and notebooks show."""
+        """What notebooks show."""
         import inspect  # noqa: PLC0415  # takes as long as all else here
 
         return inspect.signature(_named(self.__name__.removeprefix("bns.")))
+
+    @property
+    def __doc__(self) -> str:  # type: ignore[override]  # of each folder, not of this class
+        """What `help` and notebooks show: the function's words, and its call, for `help` shows no signature of a folder."""
+        import inspect  # noqa: PLC0415  # as above
+
+        signature = self.__signature__
+        bare = [p.replace(annotation=p.empty) for p in signature.parameters.values()]
+        called = signature.replace(parameters=bare, return_annotation=signature.empty)
+        return f"{inspect.getdoc(_named(self.__name__.removeprefix('bns.')))}\n\nCall: {self.__name__}{called}"
 
     def __reduce__(self) -> tuple[Any, ...]:
         return importlib.import_module, (self.__name__,)

@@ -166,8 +166,9 @@ class Measurements(Shown):
         is no such trial, or nothing of it is left.
         """
         out = np.zeros(len(self._measured.table), dtype=bool)
-        for name, (from_s, to_s) in kept.items():
+        for name, ends in kept.items():
             rows, time_s = self.times_of(name)
+            from_s, to_s = _two_times(name, ends)
             inside = (time_s >= from_s) & (time_s <= to_s)
             if not inside.any():
                 raise DataError(
@@ -281,6 +282,17 @@ def _seen(table: pd.DataFrame) -> NDArray[np.bool_]:
     whole = set(POSE) <= set(table.columns)
     places = list(POSE) if whole else [name for name in table.columns if str(name).endswith(("_x_m", "_y_m"))]
     return np.asarray(table[places].notna().all(axis=1), dtype=bool)
+
+
+def _two_times(trial: str, ends: Any) -> tuple[float, float]:
+    """From when to when (s) a trial is kept. DataError for anything but two numbers."""
+    try:
+        from_s, to_s = map(float, ends)
+    except (TypeError, ValueError):
+        raise DataError(
+            f"Trial {trial} is to be kept for {ends!r}; give two times in seconds, from when and to when, such as (2.0, 6.5)."
+        ) from None
+    return from_s, to_s
 
 
 def _words_given(log: Any, more: Iterable[str | PathLike[str]], robot: str | None) -> dict[str, Any]:

@@ -44,6 +44,7 @@ def python(
     if networks:
         return "\n".join([*lines, f"print(bns.compare(log, {model[0]!r}).summary())"])
     lines += [f"model = {given}", "print(bns.compare(log, model).summary())"]
+    lines += ["found = bns.diagnose(log, model)", "print(found.summary())"]
     if names:
         lines += [f"added = bns.add(log, {names!r}, model)", "print(added.summary())", "model = added.model"]
     for t in (terms[n] for n in switches.on if n in terms):
@@ -51,8 +52,9 @@ def python(
         lines += ["model = added.model"]
     for (effect, parameter), value in switches.by_hand:
         lines += [f"numbers = {{**model.values_of({effect!r}), {parameter!r}: {value!r}}}"]
-        lines += [f"model = bns.Model(model.with_effect({effect!r}, **numbers))"]
-    return "\n".join([*lines, 'bns.Model(model).save("extended.yaml")'])
+        lines += [f"model = model.with_effect({effect!r}, **numbers)"]
+    saved = ['model.save("extended.yaml")'] if switches.on else []
+    return "\n".join([*lines, *saved, 'found.report("report.html")'])
 
 
 def _literal(tree: Any) -> str:

@@ -1,9 +1,11 @@
 """What a researcher types after ``import bns``: it works, says what it is in a line, and agrees with the command line."""
 
 import copy
+import importlib
 import inspect
 import json
 import pickle
+import pydoc
 import subprocess
 import sys
 from dataclasses import replace
@@ -101,6 +103,14 @@ def test_functions_whose_folder_has_their_name_stay_functions_and_folders():
     assert "log" in inspect.signature(bns.diagnose).parameters
     assert "emulated" in inspect.signature(bns.trial).parameters
     assert pickle.loads(pickle.dumps(bns.diagnose)) is bns.diagnose
+
+
+@pytest.mark.parametrize("name", ["diagnose", "trial"])
+def test_help_of_a_function_whose_folder_has_its_name_is_that_of_the_function(name):
+    function = getattr(importlib.import_module(f"bns.api.{name}"), name)
+    shown = " ".join(pydoc.render_doc(getattr(bns, name), renderer=pydoc.plaintext).split())
+    assert " ".join(inspect.getdoc(function).split()).partition(".")[0] in shown
+    assert f"Call: bns.{name}({next(iter(inspect.signature(function).parameters))}" in shown
 
 
 def test_every_result_is_one_line_a_text_and_a_cell(results):

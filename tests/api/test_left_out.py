@@ -154,6 +154,9 @@ def test_what_cannot_be_left_out_is_said(log):
     name = str(log.trials["trial"].iloc[0])
     with pytest.raises(DataError, match=r"has nothing from 500 s to 600 s; it lasts from 0 s to \d"):
         log.cut({name: (500, 600)})
+    for ends in (3, (1, 2, 3), ("a", "b"), None):
+        with pytest.raises(DataError, match=f"Trial {name} is to be kept for .*; give two times in seconds"):
+            log.cut({name: ends})
     with pytest.raises(DataError, match="no tracked pose"):
         log.without_rows(range(len(log.frame)))
     assert log.without_rows([]) is log

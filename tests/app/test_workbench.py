@@ -198,10 +198,21 @@ def test_what_to_type_gives_the_same(tmp_path, monkeypatch, capsys, bench):
     typed = commands([str(LOG)], ("khepera",), BOTH.with_term(Term("mine", "k * v", "v")))
     assert typed[2] == f"bns add {LOG} motor-lag turn-slip --model khepera -o extended.yaml"
     assert typed[3] == f"bns add {LOG} mine --term 'k * v' --on v --model extended.yaml -o extended.yaml"
-    exec(python([str(LOG)], ("khepera",), BOTH.moved("motor-lag", "tau_s", 0.1)), {})
+    lines = python([str(LOG)], ("khepera",), BOTH.moved("motor-lag", "tau_s", 0.1))
+    slow = ["found = bns.diagnose(log, model)", "print(found.summary())", 'found.report("report.html")']
+    assert [line for line in lines.splitlines() if "found" in line] == slow
+    exec("\n".join(line for line in lines.splitlines() if line not in slow), {})
     capsys.readouterr()
     saved = bns.Model("extended.yaml")
     assert rows_of(saved) == rows_of(bench.shown(BOTH.moved("motor-lag", "tau_s", 0.1)).model)
+
+
+def test_with_no_effect_on_no_extended_model_is_saved():
+    plain = Switches()
+    assert "extended.yaml" not in "\n".join(commands([str(LOG)], ("khepera",), plain))
+    lines = python([str(LOG)], ("khepera",), plain).splitlines()
+    assert "extended.yaml" not in "\n".join(lines)
+    assert lines[-1] == 'found.report("report.html")'
 
 
 def test_several_files_are_written_one_by_one(tmp_path):
