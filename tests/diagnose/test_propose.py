@@ -302,6 +302,13 @@ def test_an_experiment_from_which_no_decision_is_expected_is_not_offered():
     assert not replace(pair, indistinguishable=True, standard_errors=0.0).no_decision
 
 
+def test_a_place_at_zero_has_no_sign():
+    plan = Sequences(*(np.full((2, 3), number) for number in (0.1, 0.1, 2.0)))
+    arena = replace(ARENA, start=(-1e-4, -2e-3, -1e-3))
+    (said,) = proposal_lines(Proposal("none", (), (), plan, arena, BOUNDS, 2.0))
+    assert "each from x = 0.00 m, y = 0.00 m, heading 0°" in said
+
+
 @pytest.mark.slow
 def test_too_few_minutes_give_no_trial_and_say_how_many_it_takes(narrow):
     d, predictor = narrow

@@ -64,8 +64,8 @@ def proposal_lines(p: Proposal) -> list[str]:
     return [
         *lines,
         f"{len(p.plan)} trials of about {p.plan.lasting_s.mean():.0f} s are proposed, {p.plan.lasting_s.sum() / 60:.1f} min of "
-        f"driving, inside x {a.x_low_m:.2f} to {a.x_high_m:.2f} m, y {a.y_low_m:.2f} to {a.y_high_m:.2f} m, each from "
-        f"x = {a.start[0]:.2f} m, y = {a.start[1]:.2f} m, heading {np.degrees(a.start[2]):.0f}°; wheels "
+        f"driving, inside x {a.x_low_m:z.2f} to {a.x_high_m:z.2f} m, y {a.y_low_m:z.2f} to {a.y_high_m:z.2f} m, each from "
+        f"x = {a.start[0]:z.2f} m, y = {a.start[1]:z.2f} m, heading {np.degrees(a.start[2]):z.0f}°; wheels "
         f"{p.bounds.slowest_m_s:.3g} to {p.bounds.fastest_m_s:.3g} m/s.",
     ]
 

@@ -53,8 +53,9 @@ def _said(p: Parameter, number: Mapping[str, Any], words: str) -> Iterator[str]:
     value, low, high = (number.get(key) for key in ("value", "low", "high"))
     if value is None or not np.isfinite(value) or not _alone(number):
         return
+    within = (high - low) / 2.0 if low is not None and high is not None else np.inf
     if not words:
-        yield _size(value, p)
+        yield _size(value, p, within)
         return
     open_side = low is not None and high is not None and low <= p.neutral <= high
     if (value == p.neutral or open_side) and not words.startswith("+"):
@@ -69,22 +70,25 @@ def _said(p: Parameter, number: Mapping[str, Any], words: str) -> Iterator[str]:
     elif p.is_multiple and max(value, 1.0 / value) >= _BY_FACTOR:
         yield f"{side} by a factor of {_figures(max(value, 1.0 / value))}"
     else:
-        yield f"{_size(abs(value - p.neutral), p)} {side}"
+        yield f"{_size(abs(value - p.neutral), p, within)} {side}"
 
 
-def _size(value: float, p: Parameter) -> str:
-    """In units for people."""
-    if p.unit == "1":
-        return f"{_figures(100.0 * value)} %"
-    size, unit = for_people(value, p.unit)
+def _size(value: float, p: Parameter, within: float = np.inf) -> str:
+    """In units for people; ``within``: half of the interval's width."""
+    size, unit = (100.0 * value, "%") if p.unit == "1" else for_people(value, p.unit)
     gap = "" if unit.startswith("°") else " "
-    return f"{_figures(size)}{gap}{unit}"
+    return f"{_figures(size, within * abs(size / value) if value else np.inf)}{gap}{unit}"
 
 
-def _figures(value: float) -> str:
-    """Two significant figures, three of what begins with 1 (124 is not 120 beside an interval), without an exponent."""
+def _figures(value: float, within: float = np.inf) -> str:
+    """Two significant figures, three of what begins with 1 (124 is not 120 beside an interval), without an exponent.
+
+    More, up to five, where what is rounded off would be more than ``within``: it stands above its interval.
+    """
     if value == 0.0 or not np.isfinite(value):
         return f"{value:g}"
     power = int(np.floor(np.log10(abs(value))))
-    digits = (2 if abs(value) < 2.0 * 10.0**power else 1) - power
+    least = (2 if abs(value) < 2.0 * 10.0**power else 1) - power
+    enough = (digits for digits in range(least, 5 - power) if abs(round(value, digits) - value) <= within)
+    digits = next(enough, 4 - power)
     return f"{round(value, digits):.{max(digits, 0)}f}".rstrip("0").rstrip(".") if digits > 0 else f"{round(value, digits):.0f}"
