@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from bns.physics.effect import Effect, Parameter
+from bns.physics.effect import Effect
 from bns.physics.effects.force_limit import EFFECT as FORCE_LIMIT
 from bns.physics.signals import Array, Wheels
 from bns.physics.wheels.scans import limited_together
@@ -75,20 +75,7 @@ def _mean(parts: Array) -> Array:
 EFFECT = Effect(
     name="traction-limit",
     stage="wheel",
-    parameters=(
-        Parameter(
-            "max_m_s2", "m/s^2", 1e-3, math.inf, (0.02, 20.0), math.inf, "highest acceleration of the robot on a straight line"
-        ),
-        Parameter(
-            "turn_ratio",
-            "1",
-            0.05,
-            50.0,
-            (0.2, 8.0),
-            1.0,
-            "highest acceleration at a wheel in turns on the spot, divided by that on straight lines",
-        ),
-    ),
+    parameters=FORCE_LIMIT.parameters,
     equation="as force-limit, of the speeds w that the wheels have after their lag: |dv/dt| <= a where both change in one "
     "direction, r·a in opposite ones",
     residuals="As with a limit of the motors' force, and a start from rest is later by the motors' lag, but the end of each ramp "
