@@ -14,7 +14,7 @@ from bns.diagnose.data.tracks import Tracks
 from bns.diagnose.diagnosis import Diagnosis
 from bns.diagnose.estimate.calibration import calibrated
 from bns.diagnose.estimate.plausibility import fitted_again
-from bns.diagnose.estimate.significance import MIN_Z, fewest_trials
+from bns.diagnose.estimate.significance import fewest_trials
 from bns.diagnose.estimate.starts import listed
 from bns.diagnose.outcome import Outcome, alike_in_metres, outcome_of, predicts_better_throughout
 from bns.diagnose.parallel import one_thread_each
@@ -27,7 +27,7 @@ from bns.diagnose.residuals.worst_in_words import on_many_apart, on_worst
 from bns.diagnose.residuals.worst_trials import WithoutWorst, apart, far_off, most_left_out, standing_out
 from bns.diagnose.select.equivalents import TRIED, equivalent_pairs, more_numbers
 from bns.diagnose.select.result import Candidate, SelectionResult
-from bns.diagnose.select.stepwise import FALSE_ALARM, MIN_GAIN, MIN_Z_STRETCHES, StepwiseSelection
+from bns.diagnose.select.stepwise import FALSE_ALARM, MIN_GAIN, StepwiseSelection, least_z
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect
 from bns.physics.model import ActiveEffect, Model
@@ -213,7 +213,7 @@ def _hint(
         return None
     step, least = selection.steps[-1], MIN_GAIN * float(selection.nominal.losses.mean())
     level = _HINT * FALSE_ALARM / step.candidates
-    least_z = MIN_Z if selection.problem.predictor.luck is None else MIN_Z_STRETCHES
+    enough = least_z(selection.problem.predictor)
     near = [
         c
         for c in step.ranking
@@ -221,7 +221,7 @@ def _hint(
         and c.name not in judged
         and c.paired_comparison.p_value < level
         and c.paired_comparison.z > 2
-        and not (c.paired_comparison.p_value < FALSE_ALARM / step.candidates and c.paired_comparison.z > least_z)
+        and not (c.paired_comparison.p_value < FALSE_ALARM / step.candidates and c.paired_comparison.z > enough)
         and c.paired_comparison.elpd_diff > max(step.decoy_threshold, least)
     ]
     return near[0] if near else None

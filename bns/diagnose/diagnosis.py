@@ -85,7 +85,7 @@ class Diagnosis:
 
     @property
     def terms_rejected(self) -> bool:
-        """Does the error on held-out trials not fall with the terms, or certainly rise at a horizon? They are not added then."""
+        """As `bns.diagnose.beside_terms.terms_rejected`."""
         return terms_rejected(self.errors_with_terms)
 
     @property

@@ -52,18 +52,8 @@ class TractionLimit(Cause):
     stiff_s = 1e-3
 
     def wheels(self, wheels: np.ndarray, moment: Moment) -> np.ndarray:
-        small_s = moment.step_s / FINE
-        out, now = np.empty_like(wheels), np.zeros_like(wheels[:, 0])
-        for i in range(wheels.shape[1]):
-            way = np.zeros_like(now)
-            for _ in range(FINE):
-                push = np.clip((wheels[:, i] - now) / self.stiff_s, -self.max_m_s2, self.max_m_s2)
-                ahead, spin = push.mean(axis=1), (push[:, 1] - push[:, 0]) / 2 * self.turn_ratio
-                after = now + np.stack([ahead - spin, ahead + spin], axis=1) * small_s
-                way += (now + after) / 2 * small_s
-                now = after
-            out[:, i] = way / moment.step_s
-        return out
+        near, limits = self.max_m_s2 * self.stiff_s, (self.max_m_s2, self.max_m_s2 * self.turn_ratio)
+        return _in_small_steps(wheels, moment, lambda gap: np.clip(gap / near, -1.0, 1.0), limits)
 
 
 @dataclass

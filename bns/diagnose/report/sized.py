@@ -68,7 +68,8 @@ def _said(p: Parameter, number: Mapping[str, Any], words: str) -> Iterator[str]:
     if only:
         yield side
     elif p.is_multiple and max(value, 1.0 / value) >= _BY_FACTOR:
-        yield f"{side} by a factor of {_figures(max(value, 1.0 / value))}"
+        factor = max(value, 1.0 / value)
+        yield f"{side} by a factor of {_figures(factor, within * factor / value)}"
     else:
         yield f"{_size(abs(value - p.neutral), p, within)} {side}"
 

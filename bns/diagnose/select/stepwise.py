@@ -44,6 +44,11 @@ CLOCKS_CHANCE = DEFAULTS.select.clocks_chance
 MOST = DEFAULTS.select.most_effects
 
 
+def least_z(predictor: Predictor) -> float:
+    """By how many standard errors an effect must gain to be taken: of wheels, and of a body that is simulated itself."""
+    return MIN_Z if predictor.luck is None else MIN_Z_STRETCHES
+
+
 class StepwiseSelection:
     """A search for the effects that ``model`` lacks, on the tracks of a predictor.
 
@@ -69,7 +74,7 @@ class StepwiseSelection:
         self.catalogue = listed(self.model, extra, predictor.tracks, barred)
         self._worth = dict(self.catalogue) if predictor.screening is None else {}
         self.level = FALSE_ALARM / max(len(self.catalogue), 1)
-        self._acceptance = Acceptance(self.catalogue, self.level, MIN_Z if predictor.luck is None else MIN_Z_STRETCHES)
+        self._acceptance = Acceptance(self.catalogue, self.level, least_z(predictor))
         self._exchanges = Exchanges(predictor, self.catalogue, self._worth, tick)
         shared = self.catalogue, self._worth, self._exchanges, self._acceptance, tick
         self._look_back = LookBack(predictor, *shared)

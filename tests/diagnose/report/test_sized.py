@@ -30,6 +30,9 @@ JOINTS = {name: number(0.01) for name in ("across_rad", "at_m", "over_m")}
         ("wheel-mismatch", {"ratio": number(1.0296, 1.0282, 1.031)}, "the right wheel's diameter is 3 % larger than the left"),
         ("wheelbase", {"factor": number(2.5)}, "the effective wheelbase is longer by a factor of 2.5 than that of the model"),
         ("wheelbase", {"factor": number(0.4)}, "the effective wheelbase is shorter by a factor of 2.5 than that of the model"),
+        ("wheelbase", {"factor": number(2.5412, 2.541, 2.5414)}, "the effective wheelbase is longer by a factor of 2.541 than"),
+        ("wheelbase", {"factor": number(0.4012, 0.4011, 0.4013)}, "the effective wheelbase is shorter by a factor of 2.493 than"),
+        ("wheelbase", {"factor": number(0.4012, 0.39, 0.41)}, "the effective wheelbase is shorter by a factor of 2.5 than"),
         ("yaw-bias", {"rate_rad_s": number(-0.05)}, "the robot turns 2.9°/s to the right whenever it moves"),
         ("reverse-gain", {"gain": number(0.9)}, "wheels turn 10 % slower backwards than forwards"),
         (
