@@ -6,14 +6,17 @@ One that has no parameters beside those of the simpler one does the same elsewhe
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass
 
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.lacking import fit_without
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect
+from bns.physics.order import OTHERS, place
 
 _EVIDENCE = DEFAULTS.select.variant_evidence
+_SAME = DEFAULTS.select.variant_same
 Exchange = tuple[str, str, Fit]
 """An accepted name, the name of what takes its place, and the fit."""
 
@@ -28,6 +31,36 @@ def variant(catalogue: Mapping[str, Effect], name: str) -> bool:
     """Whether an effect has the parameters of the one that it extends and no others: it acts at another place in the chain."""
     parts = extended(catalogue, name)
     return bool(parts) and {p.name for p in catalogue[name].parameters} == {p.name for p in catalogue[parts[0]].parameters}
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A fit with an effect at another place in the chain (`variant`), where it does the same: nothing acts between the places."""
+
+    fit: Fit
+    places: tuple[float, float]
+
+    def parted_by(self, effect: Effect) -> bool:
+        """Does that effect act between the two places, so that beside it they differ?"""
+        return min(self.places) < place(effect.name, effect.after) < max(self.places)
+
+
+def moved_in_chain(
+    catalogue: Mapping[str, Effect], problem: Problem, fit: Fit, accepted: Collection[str]
+) -> list[Moved]:
+    """Each accepted effect at its other place in the chain, where that makes no difference in this model.
+
+    A limit of the motors' force may be one of the tyres' grip as long as no lag is between them. Such a lag may show beside the
+    second alone: a ramp that is limited before the lag and ends late is no ramp that begins late.
+    """
+    found = []
+    for name in accepted:
+        for other in (effect for effect in catalogue.values() if variant(catalogue, effect.name) and effect.extends == name):
+            values = fit.model.values_of(name)
+            model = fit.model.without(name).with_active(other, tuple(values[p.name] for p in other.parameters))
+            if abs(problem.loss(model) - fit.loss) < _SAME:
+                found.append(Moved(problem.fit(model), (place(name, OTHERS), place(other.name, OTHERS))))
+    return found
 
 
 def fits_better(before: Fit, after: Fit) -> bool:

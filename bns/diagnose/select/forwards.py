@@ -15,7 +15,7 @@ from bns.diagnose.parallel import each
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.select.acceptance import Acceptance
 from bns.diagnose.select.exchanges import Exchanges
-from bns.diagnose.select.extending import extended, fits_better, simple, to_extend, variant
+from bns.diagnose.select.extending import Moved, extended, fits_better, moved_in_chain, simple, to_extend, variant
 from bns.diagnose.select.indistinguishable import indistinguishable
 from bns.diagnose.select.negligible import certainly_better
 from bns.diagnose.select.result import Candidate, SelectionStep
@@ -29,6 +29,13 @@ BEHIND = DEFAULTS.select.behind
 MOST = DEFAULTS.select.most_effects
 SIMPLE_FIRST = DEFAULTS.select.simple_first
 CURVE_FROM = DEFAULTS.select.curve_from
+
+
+def accepted_with(accepted: tuple[str, ...], step: SelectionStep, fit: Fit) -> tuple[str, ...]:
+    """What is accepted after a step that ended in ``fit``: an effect that it moved in the chain goes by its name there."""
+    there = {active.effect.name: active.effect for active in fit.model.effects}
+    kept = [name for name in accepted if name != step.instead_of]
+    return (*(n if n in there else next(e.name for e in there.values() if e.extends == n) for n in kept), step.selected)
 
 
 class Forwards:
@@ -67,7 +74,7 @@ class Forwards:
         added = next(c.fit for c in step.ranking if c.name == step.selected)
         if not self._curve_does_better(problem, fit, added):
             return forwards
-        there = (*(name for name in accepted if name != step.instead_of), step.selected)
+        there = accepted_with(accepted, step, forwards[2])
         ahead = problem.fit(self._looked_ahead(*forwards[1:], there))
         if not self._curve_does_better(problem, fit, ahead):
             return forwards
@@ -88,19 +95,31 @@ class Forwards:
     ) -> tuple[SelectionStep, Problem, Fit]:
         """The best candidate that earns its place and is believed once noise and numbers have settled; what it ends in.
 
-        Where there is none, the best of those that extend an effect which does nothing by itself here.
+        Where there is none, the best of those that extend an effect which does nothing by itself here, and of those that show
+        what an accepted effect's place in the chain is.
         """
         left = self._worth_a_fit(problem, fit, accepted)
         place = to_extend(self._worth.values(), fit, accepted, lambda: self._exchanges.of(problem, fit, accepted))
         tried, decoy_threshold = self._with_decoys(problem, fit, [*left, *(self._worth[name] for name in place)], place)
         of = len(self._catalogue) - len(accepted) if self._predictor.screening is not None else 0
         chosen = self._chosen(problem, fit, tried, decoy_threshold, place, of)
-        lone = [effect for effect in self._worth.values() if effect.extends and effect.name not in (*accepted, *place)]
-        if chosen[0].selected or not lone:
+        if chosen[0].selected:
             return chosen
-        first, tried = chosen[0], each(partial(self._tried, problem, fit, {}), lone)
+        lone = [effect for effect in self._worth.values() if effect.extends and effect.name not in (*accepted, *place)]
+        moved = moved_in_chain(self._catalogue, problem, fit, accepted) if self._predictor.screening is None else []
+        parted = [(one, effect) for one in moved for effect in left if one.parted_by(effect)]
+        first = chosen[0]
+        tried = [
+            *each(partial(self._tried, problem, fit, {}), lone),
+            *each(partial(self._tried_beside_moved, problem, fit), parted),
+        ]
+        if not tried:
+            return chosen
         step, problem, fit = self._chosen(problem, fit, tried, decoy_threshold, {}, of)
-        ranking = sorted((*first.ranking, *step.ranking), key=lambda c: -c.paired_comparison.elpd_diff)
+        known = {c.name for c in step.ranking}
+        ranking = sorted(
+            (*(c for c in first.ranking if c.name not in known), *step.ranking), key=lambda c: -c.paired_comparison.elpd_diff
+        )
         passed_over = step.passed_over or first.passed_over
         return replace(step, ranking=tuple(ranking), passed_over=passed_over), problem, fit
 
@@ -173,6 +192,13 @@ class Forwards:
         simpler = (c for c in ranking if c.name in parts and c.name not in place and not c.rejected_because)
         nearly = (c for c in simpler if c.paired_comparison.elpd_diff >= least)
         return any(self._acceptance.earned(c, before, decoy_threshold) for c in nearly)
+
+    def _tried_beside_moved(self, problem: Problem, fit: Fit, parted: tuple[Moved, Effect]) -> Candidate:
+        """An effect added to a model, or to that with an accepted effect at another place in the chain, whichever fits better."""
+        moved, effect = parted
+        self._tick(effect.name)
+        added = min(fit_with(problem, fit, effect), fit_with(problem, moved.fit, effect), key=lambda one: one.loss)
+        return self._acceptance.candidate(problem, fit, added, effect.name)
 
     def _worth_a_fit(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> list[Effect]:
         """What is fitted beside the accepted effects: where fits are costly, all that the screening ever found promising."""

@@ -28,7 +28,7 @@ from bns.diagnose.predict.base import Predictor
 from bns.diagnose.select.acceptance import Acceptance
 from bns.diagnose.select.exchanges import Entry, Exchanges
 from bns.diagnose.select.extending import fits_better, reduced
-from bns.diagnose.select.forwards import Forwards
+from bns.diagnose.select.forwards import Forwards, accepted_with
 from bns.diagnose.select.indistinguishable import indistinguishable
 from bns.diagnose.select.look_back import LookBack
 from bns.diagnose.select.negligible import negligibly_worse
@@ -166,7 +166,7 @@ class StepwiseSelection:
                 steps = [*(earlier.slim() for earlier in steps), step]  # sixty fits, each as large as the log
                 if step.selected:
                     self._exchanges.entry = Entry(*before, accepted, step)
-                    accepted = (*(a for a in accepted if a != step.instead_of), step.selected)
+                    accepted = accepted_with(accepted, step, fit)
                     problem, fit, accepted = self._look_back.exchange_step(problem, fit, accepted)
                     problem, fit, accepted = self._look_back.backward_step(problem, fit, accepted)
             if accepted == there:

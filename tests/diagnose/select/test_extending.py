@@ -5,8 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.diagnose.select.extending import extended, fits_better, simple, to_extend, variant
+from bns.diagnose.data.tracks import tracks_of
+from bns.diagnose.estimate.problem import problem_for
+from bns.diagnose.predict.wheels import WheelPredictor
+from bns.diagnose.select.extending import extended, fits_better, moved_in_chain, simple, to_extend, variant
+from bns.diagnose.select.stepwise import StepwiseSelection
 from bns.physics.effects import all_effects
+from tests.diagnose.worlds import NOMINAL, hidden, measured
 
 
 def test_a_variant_is_taken_for_what_it_earns_on_trials_held_out():
@@ -56,3 +61,32 @@ def test_exchanges_are_asked_for_only_where_something_has_no_place_yet():
     fit = SimpleNamespace(model=SimpleNamespace(effects=(SimpleNamespace(effect=catalogue["motor-lag"]),)))
     found = to_extend([catalogue["lag-mismatch"]], fit, ("motor-lag",), lambda: pytest.fail("asked for"))
     assert found == {"lag-mismatch": ("motor-lag", fit)}
+
+
+SLIPS = {"max_m_s2": 0.12, "turn_ratio": 1.5}
+
+
+def test_a_limit_lies_behind_a_lag_that_shows_only_there():
+    """Ramps that last longer than the lag: beside a limit of the motors' force the lag earns nothing."""
+    table = measured(hidden(motor_lag={"tau_s": 0.15}, traction_limit=SLIPS), trials=16, seed=11)
+    predictor = WheelPredictor(tracks_of(table))
+    relevant = {"acceleration-limit", "force-limit", "traction-limit", "motor-lag", "braking-lag"}
+    search = StepwiseSelection(predictor, NOMINAL, barred=tuple(set(all_effects()) - relevant))
+    found = search.run()
+    assert set(found.accepted) == {"traction-limit", "motor-lag"}
+    assert found.fit.model.values_of("traction-limit") == pytest.approx(SLIPS, rel=0.03)
+    assert found.fit.model.values_of("motor-lag")["tau_s"] == pytest.approx(0.15, rel=0.1)
+
+
+def test_a_place_in_the_chain_makes_no_difference_until_something_acts_between():
+    limited = hidden(force_limit=SLIPS)
+    predictor = WheelPredictor(tracks_of(measured(limited, trials=6, seed=3)))
+    problem = problem_for(predictor, limited)
+    fit = problem.fit(limited)
+    (moved,) = moved_in_chain(all_effects(), problem, fit, ("force-limit",))
+    assert moved.fit.model.values_of("traction-limit") == fit.model.values_of("force-limit")
+    parting = {name for name, effect in all_effects().items() if moved.parted_by(effect)}
+    assert {"motor-lag", "command-delay", "gear-friction"} <= parting
+    assert not parting & {"speed-gain", "acceleration-limit", "wheelbase", "clock-offset"}
+    lagging = limited.with_effect("motor-lag", tau_s=0.2)
+    assert moved_in_chain(all_effects(), problem, problem.fit(lagging, rounds=0), ("force-limit",)) == []
