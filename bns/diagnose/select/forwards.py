@@ -116,10 +116,8 @@ class Forwards:
         if not tried:
             return chosen
         step, problem, fit = self._chosen(problem, fit, tried, decoy_threshold, {}, of)
-        known = {c.name for c in step.ranking}
-        ranking = sorted(
-            (*(c for c in first.ranking if c.name not in known), *step.ranking), key=lambda c: -c.paired_comparison.elpd_diff
-        )
+        best = {c.name: c for c in sorted((*first.ranking, *step.ranking), key=lambda c: c.paired_comparison.elpd_diff)}
+        ranking = sorted(best.values(), key=lambda c: -c.paired_comparison.elpd_diff)
         passed_over = step.passed_over or first.passed_over
         return replace(step, ranking=tuple(ranking), passed_over=passed_over), problem, fit
 
@@ -194,11 +192,10 @@ class Forwards:
         return any(self._acceptance.earned(c, before, decoy_threshold) for c in nearly)
 
     def _tried_beside_moved(self, problem: Problem, fit: Fit, parted: tuple[Moved, Effect]) -> Candidate:
-        """An effect added to a model, or to that with an accepted effect at another place in the chain, whichever fits better."""
+        """An effect added to a model with an accepted effect at another place in the chain, as a candidate beside ``fit``."""
         moved, effect = parted
         self._tick(effect.name)
-        added = min(fit_with(problem, fit, effect), fit_with(problem, moved.fit, effect), key=lambda one: one.loss)
-        return self._acceptance.candidate(problem, fit, added, effect.name)
+        return self._acceptance.candidate(problem, fit, fit_with(problem, moved.fit, effect), effect.name)
 
     def _worth_a_fit(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> list[Effect]:
         """What is fitted beside the accepted effects: where fits are costly, all that the screening ever found promising."""
