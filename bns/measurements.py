@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bns.errors import ModelError
+from bns.targets import obstacle
 
 if TYPE_CHECKING:  # half a second to load, and a run needs no table
     import pandas as pd
@@ -62,8 +63,8 @@ def check_table_name(path: Path) -> None:
     """ModelError unless a table can be written there."""
     if path.suffix not in {".csv", ".parquet"}:
         raise ModelError(f"Measurements cannot be written to {path}; the name must end in .csv or .parquet.")
-    if not path.parent.is_dir():
-        raise ModelError(f"There is no folder {path.parent} to write {path.name} into; make it first.")
+    if found := obstacle(path):
+        raise ModelError(f"Measurements cannot be written to {path}: {found}; choose another place.")
 
 
 def write_measurements(table: pd.DataFrame, path: str | Path, columns: Sequence[str] = COLUMNS) -> None:

@@ -12,7 +12,8 @@ import bns
 
 PACKAGE = Path(bns.__file__).parent
 FLOORS = (
-    {"change", "errors", "examples", "extras", "options", "registry", "safe_yaml", "shipped", "spec", "measurements", "__init__"},
+    {"change", "errors", "examples", "extras", "measurements", "options", "registry", "safe_yaml", "shipped", "spec", "targets"}
+    | {"__init__"},
     {"engine"},
     {"tasks"},
     {"robots"},

@@ -18,6 +18,7 @@ from bns.physics.jointed.mechanism import machine
 from bns.physics.jointed.model import JointedModel
 from bns.physics.jointed.model_files import is_body, load_body
 from bns.physics.model import BASES, load_model
+from bns.targets import obstacle
 
 Given = str | PathLike[str] | physics.Model
 _BODY = re.compile(r"^base:\s*[\"']?mujoco", re.MULTILINE)
@@ -172,8 +173,8 @@ def checked_target(path: Path) -> Path:
     """ModelError unless a model can be written there."""
     if path.suffix not in {".yaml", ".yml"}:
         raise ModelError(f"A model cannot be written to {path}; the name must end in .yaml.")
-    if not path.absolute().parent.is_dir():
-        raise ModelError(f"There is no folder {path.parent} to write {path.name} into; make it first.")
+    if found := obstacle(path):
+        raise ModelError(f"A model cannot be written to {path}: {found}; choose another place.")
     return path
 
 

@@ -33,6 +33,7 @@ from bns.errors import DataError, in_both
 from bns.physics.effect import Effect
 from bns.physics.jointed.model import JointedModel
 from bns.store.disk.files import publish
+from bns.targets import obstacle
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -199,8 +200,8 @@ def checked_minutes(minutes: float) -> None:
 
 def checked_output(path: Path, what: str, ending: str) -> Path:
     """The path; DataError unless a file of that ending can be written there."""
-    if path.suffix != ending or not path.absolute().parent.is_dir():
-        raise DataError(
-            f"{what} cannot be written to {path}; give a name that ends in {ending}, in a folder that is there."
-        )
+    if path.suffix != ending:
+        raise DataError(f"{what} cannot be written to {path}; the name must end in {ending}.")
+    if found := obstacle(path):
+        raise DataError(f"{what} cannot be written to {path}: {found}; choose another place.")
     return path

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
@@ -25,6 +24,7 @@ from bns.errors import ModelError
 from bns.extras import extra
 from bns.robots import load_robot
 from bns.spec import robot_and_options
+from bns.targets import obstacle
 
 if TYPE_CHECKING:
     import torch
@@ -117,9 +117,8 @@ def check_writable(path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ModelError(f"cannot make the folder of {path}: {error.strerror}; choose another file.") from error
-    if path.is_dir() or not os.access(path.parent, os.W_OK):
-        reason = "it is a folder" if path.is_dir() else f"{path.parent} cannot be written"
-        raise ModelError(f"cannot write {path}: {reason}; choose another file.")
+    if found := obstacle(path):
+        raise ModelError(f"cannot write {path}: {found}; choose another file.")
 
 
 def load_simulator(path: Path | str) -> StaticSimulator:

@@ -70,9 +70,8 @@ def explained(action: str, path: Path) -> Iterator[None]:
             reason, remedy = f"Nothing can be made in the folder {path.parent}.", "choose another folder."
         else:
             reason, remedy = "", "look after the disk and repeat the command."
-        raise StoreError(
-            f"cannot {action} {path}: {error.strerror or error}. {reason} Nothing that was finished is lost: {remedy}"
-        ) from error
+        why = f"{error.strerror or error}.{' ' * bool(reason)}{reason}"
+        raise StoreError(f"cannot {action} {path}: {why} Nothing that was finished is lost: {remedy}") from error
 
 
 def what_is_there(results: Path) -> str:
