@@ -47,5 +47,5 @@ def test_commands_refuse_a_place_before_they_read_or_run_anything(words, tmp_pat
 
 
 def test_so_does_python(tmp_path):
-    with pytest.raises(BnsError, match="Measurements cannot be written to .*: there is no folder"):
+    with pytest.raises(BnsError, match=r"Measurements cannot be written to .*: there is no folder"):
         bns.run(evaluations=1, measurements=tmp_path / "none" / "x.csv")

@@ -180,7 +180,9 @@ class Effect:
     A search tries it in the place of that effect, once that one is accepted or where the model has it.
     """
     contains: tuple[str, ...] = ()
-    """Names of other effects that extend the same one, and that this one equals at neutral values of what only it has."""
+    """Names of other effects that this one equals at neutral values of what only it has; they extend the same one, or it extends
+    what extends them.
+    """
 
     def __post_init__(self) -> None:
         for kind, given, valid in (
@@ -220,6 +222,11 @@ class Effect:
         bounded = tuple(p.lasting(longest_s) for p in self.parameters)
         starts = [tuple(min(v, p.high) for v, p in zip(start, bounded, strict=True)) for start in self.starts]
         return replace(self, parameters=bounded, starts=tuple(dict.fromkeys(starts)))
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Names of the effects in whose place it may come: those that it contains, and what it extends."""
+        return (*self.contains, self.extends) if self.extends else self.contains
 
     @property
     def in_words(self) -> str:

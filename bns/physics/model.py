@@ -162,7 +162,7 @@ class Model:
         One that is new and extends an effect of the model takes the place of that one, which it contains.
         """
         old = next((a for a in self.effects if a.effect.name == effect.name), None)
-        parts = {effect.extends, *effect.contains} if old is None else set()
+        parts = effect.parts if old is None else ()
         simpler = next((a for a in self.effects if a.effect.name in parts), None)
         others = tuple(a for a in self.effects if a is not old and a is not simpler)
         active = ActiveEffect(effect, values, replaces=simpler if old is None else old.replaces)
@@ -233,7 +233,7 @@ class Model:
         if back is None:
             return rest
         name = back.effect.name
-        heir = next((a for a in rest.effects if name in (a.effect.extends, *a.effect.contains) and not a.replaces), None)
+        heir = next((a for a in rest.effects if name in a.effect.parts and not a.replaces), None)
         if heir is None:
             return rest._in_order((*rest.effects, back), self.is_friction_last)
         return replace(rest, effects=tuple(replace(a, replaces=back) if a is heir else a for a in rest.effects))

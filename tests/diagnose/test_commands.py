@@ -227,7 +227,7 @@ def test_a_run_leaves_measurements_that_its_own_networks_are_held_against(tmp_pa
 
 def test_a_table_that_could_not_be_written_is_refused_before_the_run(tmp_path, capsys):
     assert main(["run", "--measurements", str(tmp_path / "gone" / "m.csv"), "--results", str(tmp_path / "r")]) == 2
-    assert "make it first" in capsys.readouterr().err
+    assert f"there is no folder {tmp_path / 'gone'}" in capsys.readouterr().err
     assert not (tmp_path / "r").exists()
 
 

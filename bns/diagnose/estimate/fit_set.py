@@ -68,7 +68,7 @@ def fit_set(
     tried on the way; that of this one is added, and nothing is tried twice.
     """
     tried = Tried() if tried is None else tried
-    inside = {name for effect in effects for name in (effect.extends, *effect.contains)}
+    inside = {name for effect in effects for name in effect.parts}
     effects = [effect for effect in effects if effect.name not in inside]
     order: tuple[Effect, ...] = ()
     problem, fit = tried.reached(predictor, model, order)

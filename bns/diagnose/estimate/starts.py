@@ -102,7 +102,7 @@ def fit_extended(problem: Problem, base: Fit, effect: Effect, given: bool = Fals
     Or in the place of one that extends the same effect in another way. ``given``: that one comes back if this goes. Of an effect
     with a jagged loss its own starts are tried, too: its best place may be far from that of the simpler one.
     """
-    alike = {effect.extends, *(a.effect.name for a in base.model.effects if a.effect.extends == effect.extends)}
+    alike = {*effect.parts, *(a.effect.name for a in base.model.effects if a.effect.extends == effect.extends)}
     gone = next(a.effect.name for a in base.model.effects if a.effect.name in alike)
     names = {p.name for p in effect.parameters}
     known = {name: value for name, value in base.model.values_of(gone).items() if name in names}

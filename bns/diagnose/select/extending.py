@@ -13,7 +13,6 @@ from bns.diagnose.estimate.fitting import Problem
 from bns.diagnose.estimate.lacking import fit_without
 from bns.diagnose.settings import DEFAULTS
 from bns.physics.effect import Effect
-from bns.physics.order import OTHERS, place
 
 _EVIDENCE = DEFAULTS.select.variant_evidence
 _SAME = DEFAULTS.select.variant_same
@@ -42,7 +41,7 @@ class Moved:
 
     def parted_by(self, effect: Effect) -> bool:
         """Does that effect act between the two places, so that beside it they differ?"""
-        return min(self.places) < place(effect.name, effect.after) < max(self.places)
+        return min(self.places) < effect.place < max(self.places)
 
 
 def moved_in_chain(
@@ -55,11 +54,11 @@ def moved_in_chain(
     """
     found = []
     for name in accepted:
-        for other in (effect for effect in catalogue.values() if variant(catalogue, effect.name) and effect.extends == name):
-            values = fit.model.values_of(name)
+        for other in (effect for effect in catalogue.values() if variant(catalogue, effect.name) and name in effect.parts):
+            values = other.neutral | fit.model.values_of(name)
             model = fit.model.without(name).with_active(other, tuple(values[p.name] for p in other.parameters))
             if abs(problem.loss(model) - fit.loss) < _SAME:
-                found.append(Moved(problem.fit(model), (place(name, OTHERS), place(other.name, OTHERS))))
+                found.append(Moved(problem.fit(model), (catalogue[name].place, other.place)))
     return found
 
 
@@ -113,7 +112,7 @@ def beside(lone: Iterable[Effect], exchanges: Collection[Exchange]) -> dict[str,
 def _replaced(effect: Effect, effects: Iterable[Effect], fit: Fit, accepted: Collection[str]) -> str:
     """What an effect that extends another would replace in the model: a part of it, or what extends that part, too; else ""."""
     there = {active.effect.name for active in fit.model.effects}
-    part = next((name for name in (*effect.contains, effect.extends) if name in there), "")
+    part = next((name for name in effect.parts if name in there), "")
     return part or next((e.name for e in effects if e.extends == effect.extends and e.name in accepted), "")
 
 

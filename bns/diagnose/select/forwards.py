@@ -15,7 +15,7 @@ from bns.diagnose.parallel import each
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.select.acceptance import Acceptance
 from bns.diagnose.select.exchanges import Exchanges
-from bns.diagnose.select.extending import Moved, extended, fits_better, moved_in_chain, simple, to_extend, variant
+from bns.diagnose.select.extending import extended, fits_better, moved_in_chain, simple, to_extend, variant
 from bns.diagnose.select.indistinguishable import indistinguishable
 from bns.diagnose.select.negligible import certainly_better
 from bns.diagnose.select.result import Candidate, SelectionStep
@@ -31,11 +31,17 @@ SIMPLE_FIRST = DEFAULTS.select.simple_first
 CURVE_FROM = DEFAULTS.select.curve_from
 
 
+def _best_of_each(tried: Sequence[Candidate]) -> list[Candidate]:
+    """Of candidates of the same name the one that gains the most on held-out trials."""
+    best = {c.name: c for c in sorted(tried, key=lambda c: c.paired_comparison.elpd_diff)}
+    return list(best.values())
+
+
 def accepted_with(accepted: tuple[str, ...], step: SelectionStep, fit: Fit) -> tuple[str, ...]:
     """What is accepted after a step that ended in ``fit``: an effect that it moved in the chain goes by its name there."""
     there = {active.effect.name: active.effect for active in fit.model.effects}
     kept = [name for name in accepted if name != step.instead_of]
-    return (*(n if n in there else next(e.name for e in there.values() if e.extends == n) for n in kept), step.selected)
+    return (*(n if n in there else next(e.name for e in there.values() if n in e.parts) for n in kept), step.selected)
 
 
 class Forwards:
@@ -95,31 +101,37 @@ class Forwards:
     ) -> tuple[SelectionStep, Problem, Fit]:
         """The best candidate that earns its place and is believed once noise and numbers have settled; what it ends in.
 
-        Where there is none, the best of those that extend an effect which does nothing by itself here, and of those that show
-        what an accepted effect's place in the chain is.
+        Where there is none, the best of those that extend an effect which does nothing by itself here.
         """
         left = self._worth_a_fit(problem, fit, accepted)
         place = to_extend(self._worth.values(), fit, accepted, lambda: self._exchanges.of(problem, fit, accepted))
         tried, decoy_threshold = self._with_decoys(problem, fit, [*left, *(self._worth[name] for name in place)], place)
+        tried = _best_of_each([*tried, *self._beside_moved(problem, fit, accepted, left)])
         of = len(self._catalogue) - len(accepted) if self._predictor.screening is not None else 0
         chosen = self._chosen(problem, fit, tried, decoy_threshold, place, of)
-        if chosen[0].selected:
-            return chosen
         lone = [effect for effect in self._worth.values() if effect.extends and effect.name not in (*accepted, *place)]
-        moved = moved_in_chain(self._catalogue, problem, fit, accepted) if self._predictor.screening is None else []
-        parted = [(one, effect) for one in moved for effect in left if one.parted_by(effect)]
-        first = chosen[0]
-        tried = [
-            *each(partial(self._tried, problem, fit, {}), lone),
-            *each(partial(self._tried_beside_moved, problem, fit), parted),
-        ]
-        if not tried:
+        if chosen[0].selected or not lone:
             return chosen
+        first, tried = chosen[0], each(partial(self._tried, problem, fit, {}), lone)
         step, problem, fit = self._chosen(problem, fit, tried, decoy_threshold, {}, of)
-        best = {c.name: c for c in sorted((*first.ranking, *step.ranking), key=lambda c: c.paired_comparison.elpd_diff)}
-        ranking = sorted(best.values(), key=lambda c: -c.paired_comparison.elpd_diff)
+        ranking = sorted((*first.ranking, *step.ranking), key=lambda c: -c.paired_comparison.elpd_diff)
         passed_over = step.passed_over or first.passed_over
         return replace(step, ranking=tuple(ranking), passed_over=passed_over), problem, fit
+
+    def _beside_moved(
+        self, problem: Problem, fit: Fit, accepted: tuple[str, ...], effects: Sequence[Effect]
+    ) -> list[Candidate]:
+        """Each effect that acts between the places of an accepted one, beside that one at its other place (`moved_in_chain`)."""
+        if self._predictor.screening is not None:  # a fit takes too long
+            return []
+        moved = moved_in_chain(self._catalogue, problem, fit, accepted)
+        parted = [(one.fit, effect) for one in moved for effect in effects if one.parted_by(effect)]
+
+        def added(to: tuple[Fit, Effect]) -> Candidate:
+            self._tick(to[1].name)
+            return self._acceptance.candidate(problem, fit, fit_with(problem, *to), to[1].name)
+
+        return each(added, parted)
 
     def _with_decoys(
         self, problem: Problem, fit: Fit, effects: Sequence[Effect], place: Mapping[str, tuple[str, Fit]]
@@ -147,7 +159,8 @@ class Forwards:
         passed_over: list[Candidate] = []
         none_lower = False
         for index, candidate in enumerate(ranking):
-            moved = candidate.name in place and variant(self._catalogue, candidate.name)
+            gone = place.get(candidate.name, ("",))[0]
+            moved = variant(self._catalogue, candidate.name) and gone in extended(self._catalogue, candidate.name)
             if not (fits_better(fit, candidate.fit) if moved else self._acceptance.earned(candidate, fit, decoy_threshold)):
                 continue
             if self._waits(candidate, place, ranking, fit, decoy_threshold):
@@ -156,7 +169,6 @@ class Forwards:
                 passed_over += [candidate] if implausible(candidate.fit, candidate.name, bounds=False) else []
                 continue
             settled = settled_problem(self._predictor, candidate.fit.model, problem.pose_filter.noise)
-            gone = place.get(candidate.name, ("",))[0]
             lower = moved or not (gone or none_lower) or certainly_better((problem, fit), settled)
             if not lower or (gone and not moved and not self._acceptance.needed(*settled, candidate.name)):
                 none_lower |= not lower
@@ -190,12 +202,6 @@ class Forwards:
         simpler = (c for c in ranking if c.name in parts and c.name not in place and not c.rejected_because)
         nearly = (c for c in simpler if c.paired_comparison.elpd_diff >= least)
         return any(self._acceptance.earned(c, before, decoy_threshold) for c in nearly)
-
-    def _tried_beside_moved(self, problem: Problem, fit: Fit, parted: tuple[Moved, Effect]) -> Candidate:
-        """An effect added to a model with an accepted effect at another place in the chain, as a candidate beside ``fit``."""
-        moved, effect = parted
-        self._tick(effect.name)
-        return self._acceptance.candidate(problem, fit, fit_with(problem, moved.fit, effect), effect.name)
 
     def _worth_a_fit(self, problem: Problem, fit: Fit, accepted: tuple[str, ...]) -> list[Effect]:
         """What is fitted beside the accepted effects: where fits are costly, all that the screening ever found promising."""

@@ -89,4 +89,5 @@ EFFECT = Effect(
     apply=apply,
     needs="track",
     extends=FORCE_LIMIT.name,
+    contains=("acceleration-limit",),
 )
