@@ -26,16 +26,28 @@ class Acceptance:
     def __init__(self, catalogue: Mapping[str, Effect], level: float, least_z: float) -> None:
         self._catalogue, self._level, self._least_z = catalogue, level, least_z
         self.all_believed = False
+        self.doubts = 0
+        """How many decisions hung on a number that was not believed, and would be where all are."""
 
     def candidate(self, problem: Problem, fit: Fit, added: Fit, name: str) -> Candidate:
         """An effect added to a model, with what it earns and why it may not be taken."""
-        return Candidate(name, added, problem.paired_comparison(fit, added), self.rejected(added, name))
+        return Candidate(name, added, problem.paired_comparison(fit, added), self._reason(added, name, True)[0])
+
+    def refused(self, candidate: Candidate) -> bool:
+        """Whether a candidate may not be taken, asked where that decides."""
+        return bool(candidate.rejected_because and self.rejected(candidate.fit, candidate.name))
 
     def rejected(self, fit: Fit, name: str, bounds: bool = True) -> str:
         """Why an effect may not be taken; where all numbers are believed, only for one at a bound or not determined."""
-        why = implausible(fit, name, bounds)
-        believed = self.all_believed and not at_bound(fit, name)
-        return undetermined(fit, name) or ("" if believed else why)
+        why, doubted = self._reason(fit, name, bounds)
+        self.doubts += doubted
+        return why
+
+    def _reason(self, fit: Fit, name: str, bounds: bool) -> tuple[str, bool]:
+        """Why an effect may not be taken, and whether that is for a number alone which could be believed."""
+        known, why = undetermined(fit, name), implausible(fit, name, bounds)
+        believable = bool(why) and not known and not at_bound(fit, name)
+        return known or ("" if believable and self.all_believed else why), believable and not self.all_believed
 
     def earned(self, candidate: Candidate, before: Fit, decoy_threshold: float) -> bool:
         """Whether what a candidate gains over the fit before is certain, enough, and more than a decoy gains."""

@@ -165,7 +165,7 @@ class Forwards:
                 continue
             if self._waits(candidate, place, ranking, fit, decoy_threshold):
                 continue
-            if candidate.rejected_because:
+            if self._acceptance.refused(candidate):
                 passed_over += [candidate] if implausible(candidate.fit, candidate.name, bounds=False) else []
                 continue
             settled = settled_problem(self._predictor, candidate.fit.model, problem.pose_filter.noise)
@@ -199,7 +199,7 @@ class Forwards:
         if not gone or gone in {*parts, *self._catalogue[candidate.name].contains}:
             return False
         least = SIMPLE_FIRST * candidate.paired_comparison.elpd_diff
-        simpler = (c for c in ranking if c.name in parts and c.name not in place and not c.rejected_because)
+        simpler = (c for c in ranking if c.name in parts and c.name not in place and not self._acceptance.refused(c))
         nearly = (c for c in simpler if c.paired_comparison.elpd_diff >= least)
         return any(self._acceptance.earned(c, before, decoy_threshold) for c in nearly)
 

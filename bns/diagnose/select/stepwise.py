@@ -7,7 +7,7 @@ or beyond what is plausible is rejected with its reason.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 
 from bns.diagnose.data.tracks import Array
@@ -49,6 +49,19 @@ def least_z(predictor: Predictor) -> float:
     return MIN_Z if predictor.luck is None else MIN_Z_STRETCHES
 
 
+@dataclass(frozen=True)
+class _Round:
+    """Where a search stood before a round, with what the round needs to come out the same again."""
+
+    model: Model
+    problem: Problem
+    fit: Fit
+    accepted: tuple[str, ...] = ()
+    steps: tuple[SelectionStep, ...] = ()
+    tried: frozenset[frozenset[str]] = frozenset()
+    entry: Entry | None = None
+
+
 class StepwiseSelection:
     """A search for the effects that ``model`` lacks, on the tracks of a predictor.
 
@@ -81,6 +94,8 @@ class StepwiseSelection:
         self._forwards = Forwards(predictor, self.model, *shared, alone, curve_does_better)
         self._plain: SelectionResult | None = begun._plain if begun is not None else None
         """Where the search without clocks of the trials ended; with implausible numbers allowed it is another."""
+        self._doubted: _Round | None = None
+        """The first round of the last search in which a number was not believed, or its last round."""
 
     def run(self, before: SelectionResult | None = None) -> SelectionResult:
         """The search; again with implausible numbers allowed where one was passed over, if that predicts better for certain.
@@ -150,31 +165,42 @@ class StepwiseSelection:
         )
 
     def _select(self) -> SelectionResult:
-        """Forwards and back until nothing more is earned; then competing models of the same size."""
-        problem, nominal = self._refit_with_noise(self.model)
-        if nominal.free:
-            problem, nominal = self._refit_with_noise(nominal.model, problem.pose_filter.noise)
-        fit = nominal
-        accepted: tuple[str, ...] = ()
-        steps: list[SelectionStep] = []
-        tried: set[frozenset[str]] = set()
+        """Forwards and back until nothing more is earned; then competing models of the same size.
+
+        A search that believes all numbers goes on where the one before it first did not believe one.
+        """
+        now, self._doubted = self._beginning(), None
+        problem, fit, accepted, steps, tried = now.problem, now.fit, now.accepted, now.steps, now.tried
         while True:
-            there = accepted
+            now = _Round(self.model, problem, fit, accepted, steps, tried, self._exchanges.entry)
+            there, doubts = accepted, self._acceptance.doubts
             if len(accepted) < MOST:
-                before = problem, fit
                 step, problem, fit = self._forwards.next_step(problem, fit, accepted)
-                steps = [*(earlier.slim() for earlier in steps), step]  # sixty fits, each as large as the log
+                steps = (*steps, step.slim())  # sixty fits, each as large as the log
                 if step.selected:
-                    self._exchanges.entry = Entry(*before, accepted, step)
+                    self._exchanges.entry = Entry(now.problem, now.fit, accepted, steps[-1])
                     accepted = accepted_with(accepted, step, fit)
                     problem, fit, accepted = self._look_back.exchange_step(problem, fit, accepted)
                     problem, fit, accepted = self._look_back.backward_step(problem, fit, accepted)
             if accepted == there:
                 problem, fit, accepted = self._look_back.merge_step(problem, fit, accepted)
-            if accepted == there or frozenset(accepted) in tried:
+            ends = accepted == there or frozenset(accepted) in tried
+            if self._doubted is None and (ends or self._acceptance.doubts > doubts):
+                self._doubted = now
+            if ends:
                 break
-            tried.add(frozenset(accepted))
+            tried |= {frozenset(accepted)}
         return self._ended(problem, fit, accepted, steps)
+
+    def _beginning(self) -> _Round:
+        """The model as it is given; where all numbers are believed, the first round in which that decides something."""
+        if self._acceptance.all_believed and self._doubted is not None and self._doubted.model is self.model:
+            self._exchanges.entry = self._doubted.entry
+            return self._doubted
+        problem, nominal = self._refit_with_noise(self.model)
+        if nominal.free:
+            problem, nominal = self._refit_with_noise(nominal.model, problem.pose_filter.noise)
+        return _Round(self.model, problem, nominal)
 
     def competing(self, found: SelectionResult, alike: bool = False) -> SelectionResult:
         """The result of this search with fewer effects than it ended with, and the explanations that compete with what is left.
@@ -208,7 +234,7 @@ class StepwiseSelection:
         if self._look_back.exchange_step(problem, fit, accepted)[2] != accepted:
             return None
         step = self._forwards.next_step(problem, fit, accepted)[0] if len(accepted) < MOST else before.steps[-1]
-        return None if step.selected else self._ended(problem, fit, accepted, [*before.steps[:-1], step])
+        return None if step.selected else self._ended(problem, fit, accepted, [*before.steps[:-1], step.slim()])
 
     def _ended(
         self, problem: Problem, fit: Fit, accepted: tuple[str, ...], steps: Sequence[SelectionStep]
@@ -218,10 +244,8 @@ class StepwiseSelection:
         if simplest is not None and len(simplest[1].free) < len(fit.free):
             competing_models = [(accepted, fit), *(r for r in competing_models if r is not simplest)]
             accepted, fit = simplest
-        rounds = (*steps[:-1], *(last.slim() for last in steps[-1:]))
-        return SelectionResult(
-            problem, problem.fit(self.model), fit, accepted, rounds, tuple(names for names, _ in competing_models)
-        )
+        names = tuple(names for names, _ in competing_models)
+        return SelectionResult(problem, problem.fit(self.model), fit, accepted, tuple(steps), names)
 
     def _refit_with_noise(self, model: Model, start: Array | None = None) -> tuple[Problem, Fit]:
         """Noise and numbers that belong together."""
