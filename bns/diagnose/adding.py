@@ -13,12 +13,13 @@ import numpy as np
 import yaml
 
 from bns.diagnose.data.load import Measured
+from bns.diagnose.effect_caveats import on_numbers
 from bns.diagnose.estimate.clocks.trial_clock_test import with_trial_clocks
 from bns.diagnose.estimate.cross_validation import AS_GIVEN, Judged, held_out_steps
 from bns.diagnose.estimate.fit import Fit
 from bns.diagnose.estimate.fit_set import Tried, fit_set
 from bns.diagnose.estimate.fitting import Problem
-from bns.diagnose.estimate.plausibility import does_nothing, fitted_again, implausible
+from bns.diagnose.estimate.plausibility import does_nothing, fitted_again, implausible, known_together, undetermined
 from bns.diagnose.estimate.problem import given_steps, problem_for
 from bns.diagnose.estimate.starts import fitting
 from bns.diagnose.parallel import one_thread_each
@@ -168,18 +169,22 @@ def _step(
 
 def warnings_on(fit: Fit, effects: Sequence[tuple[Effect, Mapping[str, str]]], errors: PairedErrors) -> Iterator[str]:
     """What a user should know before using the model: numbers at a bound or beyond belief, effects that do nothing, no gain."""
-    added = {effect.name for effect, _ in effects}
+    named = {effect.name: effect for effect, _ in effects}
     for index, number in enumerate(fit.free):
         p, value = number.parameter, float(fit.values[index])
-        if number.effect not in added:
+        if number.effect not in named:
             continue
         if value in {p.low, p.high} and value != p.neutral and value not in p.reached:
             at = f"{p.name} is at its bound, {value:g}{with_unit(p.unit)}"
             yield f"{number.effect}: {at}: the data require more than the model allows."
-    for name in sorted(added):
+    for name in sorted(named):
         why = implausible(fit, name, bounds=False)
         if why:
             yield f"{name} fits best with an implausible value: {why}."
+        elif unknown := undetermined(fit, name):
+            yield f"{name}: {unknown}: each may be anything that is allowed."
+        elif known_together(fit, name):
+            yield on_numbers(named[name])
         elif does_nothing(fit, name):
             yield f"{name} has no visible effect in these data: its numbers cannot be told from the neutral ones (no effect)."
     if errors.trials < 2:

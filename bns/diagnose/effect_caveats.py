@@ -63,7 +63,7 @@ def on_effects(
     tracker = smoothing_tracker(selection.problem, selection.fit) if names.intersection(LATE) else None
     yield from filter(None, [tracker.in_words(all_explained) if tracker is not None else ""])
     yield from (text for effect in chain for other, text in effect.beside.items() if other in names)
-    yield from (_on_numbers(known[name]) for name in selection.accepted if known_together(selection.fit, name))
+    yield from (on_numbers(known[name]) for name in selection.accepted if known_together(selection.fit, name))
     yield from _on_stamps(tracks, names)
     yield from _on_times(selection, tracks, names)
     per_trial_effect = selection.fit.model.per_trial_effect
@@ -112,7 +112,7 @@ def _implausible_text(fit: Fit, name: str, why: str) -> str:
     return f"{said}is the wheelbase really {model.wheelbase_m:.3g} m, and not {really:.3g} m?"
 
 
-def _on_numbers(effect: Effect) -> str:
+def on_numbers(effect: Effect) -> str:
     """On an effect of which no number is certain by itself."""
     own = " and ".join(p.name for p in effect.parameters)
     return (

@@ -1,6 +1,7 @@
 """Effects that no robot has: controls that say how much any spare number seems to explain.
 
-Each has the form of a real effect, but goes by something that cannot matter.
+Each has the form of a real effect, but goes by something that cannot matter. Where trials have the same commands, what happens
+in another trial is what happens in this one: so its sign is another one in each trial, too.
 """
 
 from __future__ import annotations
@@ -49,12 +50,12 @@ def _turning_in_waves(body: Body, size: float) -> Body:
 
 
 def _slip_of_another_trial(body: Body, size: float) -> Body:
-    other = np.abs(np.roll(body.yaw_rad_s, 1, axis=0))
+    other = _trial_sign(body, 5) * np.abs(np.roll(body.yaw_rad_s, 1, axis=0))
     return replace(body, forward_m_s=body.forward_m_s * (1 - size * other))
 
 
 def _sideways_of_another_trial(body: Body, size: float) -> Body:
-    other = np.roll(body.forward_m_s * body.yaw_rad_s, 1, axis=0)
+    other = _trial_sign(body, 6) * np.roll(body.forward_m_s * body.yaw_rad_s, 1, axis=0)
     return replace(body, sideways_m_s=body.sideways_m_s + size * other)
 
 

@@ -207,6 +207,9 @@ def _sorted(name: str, names: set[str], columns: set[str], numbers: set[str] | N
             unknown.append(one)
         elif one in columns or numbers is not None:
             logged.append(one)
+        elif one.lower() in VARIABLES:
+            meant = f"did you mean {one.lower()} by {one}?"
+            raise ModelError(f"formula {name}: {meant} Give a number to fit another letter (k, a, b2).")
         elif may_be_number(one):
             unknown.append(one)
         else:

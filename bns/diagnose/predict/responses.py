@@ -108,7 +108,8 @@ class Responses:
         known = self._curves.setdefault(number, {})
         found = False
         for side in (1.0, -1.0):
-            nodes = [at for at in (p.neutral, *self._planned(p, 1.0), *self._planned(p, -1.0), *known) if side * (at - value) > 0]
+            planned = (*self._planned(effect, p, 1.0), *self._planned(effect, p, -1.0))
+            nodes = [at for at in (p.neutral, *planned, *known) if side * (at - value) > 0]
             beside = p.beside(value, side * _BESIDE)
             if p.apart(beside, value) < _BESIDE / 2 or any(_BESIDE / 2 <= p.apart(at, value) <= 1.5 * _BESIDE for at in nodes):
                 continue
@@ -143,7 +144,7 @@ class Responses:
             return self._node(number, effect, p, p.plausible[1]) * (value / p.plausible[1])
         side = 1.0 if value > p.neutral else -1.0
         known = self._curves.setdefault(number, {})
-        nodes = sorted({*self._planned(p, side), *known}, key=lambda at: side * (at - p.neutral))
+        nodes = sorted({*self._planned(effect, p, side), *known}, key=lambda at: side * (at - p.neutral))
         nodes = [at for at in nodes if side * (at - p.neutral) > 0]
         if not nodes:
             return np.zeros_like(self._sound)
@@ -158,10 +159,18 @@ class Responses:
         share = (value - nodes[outer - 1]) / (nodes[outer] - nodes[outer - 1])
         return lower + share * (upper - lower)
 
-    def _planned(self, p: Parameter, side: float) -> list[float]:
-        """Nodes on one side of neutral that are simulated when they are first needed."""
-        values = [p.part_way(share, side > 0) for share in self._shares]
-        return [value for value in values if value != p.neutral]
+    def _planned(self, effect: Effect, p: Parameter, side: float) -> list[float]:
+        """Nodes on one side of neutral that are simulated when they are first needed.
+
+        A start of an effect's only number that is nearer to neutral than the first of them is one, too: an effect is looked for
+        over decades. Friction that holds a joint altogether says nothing of a seventh of it, on a straight line from none.
+        """
+        values = [value for share in self._shares if (value := p.part_way(share, side > 0)) != p.neutral]
+        if not values or len(effect.parameters) > 1:
+            return values
+        first = min(p.apart(value, p.neutral) for value in values)
+        near = {s for (s,) in effect.starts if side * (s - p.neutral) > 0 and p.apart(s, p.neutral) < first}
+        return [*sorted(near), *values]
 
     def _node(self, number: Number, effect: Effect, p: Parameter, value: float) -> Array:
         known = self._curves[number]

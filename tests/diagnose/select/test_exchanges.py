@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.diagnose.select import exchanges, forwards, look_back, stepwise
+from bns.diagnose.select import acceptance, exchanges, forwards, look_back, stepwise
 from bns.diagnose.select.acceptance import MIN_GAIN, Acceptance
 from bns.diagnose.select.exchanges import BEHIND, BEHIND_LOSS, SCREEN, Entry, Exchanges
 from bns.diagnose.select.forwards import Forwards
@@ -284,7 +284,10 @@ def test_a_longer_effect_that_lowers_no_error_goes_back_to_the_one_that_it_exten
 
 
 def an_effect(name, numbers, extends="", contains=(), lookalikes=()):
-    return SimpleNamespace(name=name, parameters=[None] * numbers, extends=extends, contains=contains, lookalikes=lookalikes)
+    parts = (*contains, extends) if extends else contains
+    return SimpleNamespace(
+        name=name, parameters=[None] * numbers, extends=extends, contains=contains, parts=parts, lookalikes=lookalikes
+    )
 
 
 def with_effects(*effects, **more):
@@ -348,7 +351,7 @@ def choosing(monkeypatch, lower):
     monkeypatch.setattr(forwards, "variant", lambda *_: False)
     monkeypatch.setattr(forwards, "certainly_better", lambda _before, settled: settled[1] in lower)
     always = {"earned": lambda *_: True, "needed": lambda *_: True}
-    search._acceptance = SimpleNamespace(rejected=lambda *_, **__: "", **always)
+    search._acceptance = SimpleNamespace(rejected=lambda *_, **__: "", refused=lambda _: False, **always)
     monkeypatch.setattr(forwards, "settled_problem", lambda _predictor, model, _: ("problem", model))
     problem = SimpleNamespace(pose_filter=SimpleNamespace(noise=None))
     return lambda tried, place: search._chosen(problem, None, tried, 0.0, place, 0)[0].selected
@@ -461,9 +464,10 @@ def test_a_gain_is_certain_by_the_signs_of_trials_and_by_its_standard_error_howe
 
 def test_where_nothing_comes_in_two_effects_may_give_way_to_one_and_the_search_goes_on(monkeypatch):
     search = StepwiseSelection.__new__(StepwiseSelection)
-    search.model, search._exchanges = None, SimpleNamespace(entry=None)
+    search.model, search._exchanges, search._doubted = None, SimpleNamespace(entry=None), None
+    search._acceptance = SimpleNamespace(doubts=0, all_believed=False)
     came, asked = {(): "a", ("a",): "b", ("c",): "d"}, []
-    fit, problem = SimpleNamespace(free=(), model=None), SimpleNamespace()
+    fit, problem = SimpleNamespace(free=(), model=SimpleNamespace(effects=())), SimpleNamespace()
 
     def next_step(_problem, _fit, accepted):
         step = SimpleNamespace(selected=came.get(accepted, ""), instead_of="")
@@ -483,3 +487,48 @@ def test_where_nothing_comes_in_two_effects_may_give_way_to_one_and_the_search_g
     assert asked == [("a", "b"), ("c", "d")]
     monkeypatch.setattr(stepwise, "MOST", 2)  # as many effects as may be are merged, too
     assert search._select() == ("c", "d")
+
+
+def test_a_search_that_believes_all_numbers_goes_on_where_one_was_first_not_believed(monkeypatch):
+    """Rounds before it would come out the same; the round itself is asked again, from where it began."""
+    search = StepwiseSelection.__new__(StepwiseSelection)
+    search.model, search._exchanges, search._doubted = "model", SimpleNamespace(entry=None), None
+    search._acceptance = SimpleNamespace(doubts=0, all_believed=False)
+    asked, begun = [], []
+
+    def next_step(problem, _fit, accepted):
+        asked.append(accepted)
+        doubted = len(accepted) == 2 and not search._acceptance.all_believed
+        search._acceptance.doubts += doubted
+        step = SimpleNamespace(selected="" if doubted or len(accepted) == 3 else "abc"[len(accepted)], instead_of="")
+        step.slim = lambda: step
+        return step, problem, SimpleNamespace(model=SimpleNamespace(effects=()))
+
+    monkeypatch.setattr(search, "_refit_with_noise", lambda *_: begun.append("begun") or ("problem", SimpleNamespace(free=())))
+    monkeypatch.setattr(stepwise, "accepted_with", lambda accepted, step, _fit: (*accepted, step.selected))
+    search._forwards = SimpleNamespace(next_step=next_step)
+    same = dict.fromkeys(("exchange_step", "backward_step", "merge_step"), lambda *state: state)
+    search._look_back = SimpleNamespace(**same)
+    monkeypatch.setattr(search, "_ended", lambda _problem, _fit, accepted, steps: (accepted, len(steps)))
+    assert search._select() == (("a", "b"), 3)
+    search._acceptance.all_believed = True
+    search._exchanges.entry = "another"
+    assert search._select() == (("a", "b", "c"), 4)
+    assert asked == [(), ("a",), ("a", "b"), ("a", "b"), ("a", "b", "c")]
+    assert begun == ["begun"]
+    search.model = "another model"
+    search._select()
+    assert asked[-4:] == [(), ("a",), ("a", "b"), ("a", "b", "c")]
+
+
+def test_only_a_number_that_could_be_believed_is_a_doubt(monkeypatch):
+    fit = SimpleNamespace()
+    for bound, unknown, doubts in ((False, "", 1), (True, "", 0), (False, "not determined", 0)):
+        asked = Acceptance({}, level=0.01, least_z=2.0)
+        for name, answer in (("implausible", "too far"), ("at_bound", bound), ("undetermined", unknown)):
+            monkeypatch.setattr(acceptance, name, lambda *_, answer=answer: answer)
+        assert asked.rejected(fit, "e") == (unknown or "too far")
+        assert asked.doubts == doubts
+        asked.all_believed = True
+        assert asked.rejected(fit, "e") == (unknown or ("too far" if bound else ""))
+        assert asked.doubts == doubts

@@ -5,6 +5,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from bns.diagnose import diagnosing
@@ -118,6 +119,20 @@ def test_decoys_move_the_robot_but_mean_nothing():
         model = NOMINAL.with_active(decoy, (0.1,))
         assert isinstance(model.effects[0], ActiveEffect)
         assert np.abs(predictor.steps(model).body - still).max() > 1e-5
+
+
+@pytest.mark.parametrize(("name", "values"), [("turn-slip", {"slip_s": 0.12}), ("side-slip", {"slip_s": 0.1})])
+def test_where_trials_repeat_the_same_commands_no_decoy_does_what_the_effect_does(name, values):
+    """What happens in another trial is then what happens in this one."""
+    one = measured(NOMINAL.with_effect(name, **values), trials=1, seed=11, noise=(0.0, 0.0), jitter=0.0, commands=8)
+    table = pd.concat([one.assign(trial=number) for number in range(12)], ignore_index=True)
+    noise = np.random.default_rng(5).normal(size=(len(table), 3)) * [0.0015, 0.0015, 0.005]
+    table[["x_m", "y_m", "heading_rad"]] += noise
+    search = StepwiseSelection(WheelPredictor(tracks_of(table)), NOMINAL, barred=all_but_rivals_of(name))
+    found = search.run()
+    assert found.accepted == (name,)
+    (gain,) = (c.paired_comparison.elpd_diff for c in found.steps[0].ranking if c.name == name)
+    assert found.steps[0].decoy_threshold < 0.2 * gain
 
 
 @pytest.mark.parametrize(("late", "stays"), [((3, 5, 12), False), (range(16), True)])
