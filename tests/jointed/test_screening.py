@@ -50,9 +50,24 @@ def test_multiples_are_stepped_by_ratio_and_everything_else_by_difference(name, 
 
 
 def test_the_nodes_of_a_limit_lie_where_it_begins_to_bind():
-    parameter = SNAKE.catalogue()["torque-limit"].parameters[0]
-    nodes = Responses(lambda _model: np.zeros(1), SNAKE, None, (0.2, 0.6, 1.2))._planned(parameter, -1.0)
+    effect = SNAKE.catalogue()["torque-limit"]
+    nodes = Responses(lambda _model: np.zeros(1), SNAKE, None, (0.2, 0.6, 1.2))._planned(effect, effect.parameters[0], -1.0)
     assert nodes == pytest.approx([0.631, 0.251, 0.063], abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "upwards", "nodes"),
+    [
+        ("joint-friction-joint5", 1.0, [0.01, 0.06, 0.18, 0.36]),
+        ("joint-friction-joint5", -1.0, [-0.015, -0.045, -0.05]),
+        ("dry-friction", 1.0, [0.005, 0.02, 0.06, 0.12]),
+    ],
+)
+def test_a_curve_is_known_where_an_effect_is_looked_for_first(name, upwards, nodes):
+    """A friction of 0.0083 rad lies on a straight line to 0.01, and on none to 0.06, where the joint is stuck."""
+    effect = SNAKE.catalogue()[name]
+    planned = Responses(lambda _model: np.zeros(1), SNAKE, None, (0.2, 0.6, 1.2))._planned(effect, effect.parameters[0], upwards)
+    assert planned == pytest.approx(nodes, abs=1e-3)
 
 
 PATCH = SNAKE.effect_named("floor-patch")

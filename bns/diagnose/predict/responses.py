@@ -169,8 +169,8 @@ class Responses:
         if not values or len(effect.parameters) > 1:
             return values
         first = min(p.apart(value, p.neutral) for value in values)
-        near = {s for (s,) in effect.starts if side * (s - p.neutral) > 0 and p.apart(s, p.neutral) < first}
-        return [*sorted(near), *values]
+        starts = [s for (s,) in effect.starts if side * (s - p.neutral) > 0 and not np.isclose(s, values).any()]
+        return [*(s for s in starts if p.apart(s, p.neutral) < first), *values]
 
     def _node(self, number: Number, effect: Effect, p: Parameter, value: float) -> Array:
         known = self._curves[number]

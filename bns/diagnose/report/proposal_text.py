@@ -23,7 +23,8 @@ def proposal_text(p: Proposal, written: str = "", command: Mapping[str, str] | N
 
     ``written``: the file with the commands; ``command``: words (data, model) of the command line that the next ones repeat.
     """
-    first = f"verdict so far: {p.verdict}; explanations to tell apart: {'; '.join(r.title for r in p.competing_models)}"
+    whose = "explanations compared" if _needless(p) else "explanations to tell apart"
+    first = f"verdict so far: {p.verdict}; {whose}: {'; '.join(r.title for r in p.competing_models)}"
     return "\n".join([first, *proposal_lines(p), *_next(p, written, command or {"data": "LOG", "model": "--model MODEL"})])
 
 

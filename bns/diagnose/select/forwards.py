@@ -160,7 +160,7 @@ class Forwards:
         none_lower = False
         for index, candidate in enumerate(ranking):
             gone = place.get(candidate.name, ("",))[0]
-            moved = variant(self._catalogue, candidate.name) and gone in extended(self._catalogue, candidate.name)
+            moved = bool(gone) and gone in extended(self._catalogue, candidate.name) and variant(self._catalogue, candidate.name)
             if not (fits_better(fit, candidate.fit) if moved else self._acceptance.earned(candidate, fit, decoy_threshold)):
                 continue
             if self._waits(candidate, place, ranking, fit, decoy_threshold):
