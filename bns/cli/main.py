@@ -61,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"bns: cannot write {error.filename or 'the output'}: {error.strerror}", file=sys.stderr)
         elif error.errno in _NO_PLACE and error.filename is not None:
             print(
-                f"bns: cannot use {error.filename}: {error.strerror}. Name another place, or repair that one.",
+                f"bns: cannot use {error.filename}: {error.strerror}. Choose another place.",
                 file=sys.stderr,
             )
         else:

@@ -38,7 +38,9 @@ class Parser(argparse.ArgumentParser):
                 self._check_option(word.partition("=")[0])
         found, unknown = super().parse_known_args(words, namespace)
         if unknown:
-            self.error(f"{' '.join(unknown)}: unexpected argument")
+            of_results = "--results" in self._option_string_actions and "--task" not in self._option_string_actions
+            meant = f" Did you mean --results {unknown[0]}?" if of_results and len(unknown) == 1 and unknown[0][0] != "-" else ""
+            self.error(f"{' '.join(unknown)}: unexpected argument.{meant}")
         while self.old:
             warn_old(*self.old.pop(0))
         return found, unknown

@@ -17,6 +17,7 @@ from bns.cli.options.measuring_options import (
     refuse_sources,
     words_of,
 )
+from bns.cli.options.option_types import number
 from bns.cli.parser import Adder
 from bns.cli.progress_bar import ticking
 
@@ -52,7 +53,7 @@ def add_experiment_options(parser: argparse.ArgumentParser) -> None:
     """How long, where and how fast."""
     parser.add_argument(
         "--minutes",
-        type=float,
+        type=number,
         default=MINUTES,
         metavar="N",
         help="minutes of driving to plan, the last trial driven to its end (default: 10)",

@@ -7,7 +7,7 @@ import sys
 from dataclasses import asdict
 
 from bns.cli.compiling import say_if_compiling
-from bns.cli.options.option_types import as_json, duration, positive
+from bns.cli.options.option_types import as_json, duration, number, positive
 from bns.cli.options.sweep_options import add_cluster_options, backend_name, request_of, say_if_experimental
 from bns.cli.parser import Adder, add_results, add_trust
 from bns.errors import SpecError
@@ -40,14 +40,14 @@ def add_commands(command: Adder) -> None:
     )
     many.add_argument(
         "--confidence",
-        type=float,
+        type=number,
         metavar="P",
         help="with --until ranking: confidence, per task, that these are the ten best of the complete sweep (default 0.95; 1: "
         "certainty)",
     )
     many.add_argument(
         "--within",
-        type=float,
+        type=number,
         metavar="D",
         help="with --until ranking: tolerance; the mean success (0 to 1) of an excluded combination may exceed that of the tenth "
         "by less than D (default: 0)",

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from bns.cli.options.option_types import number
 from bns.cli.parser import add_trust
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ def add_model(parser: argparse.ArgumentParser, *, networks: bool = False, defaul
     )
     parser.add_argument(
         "--wheelbase",
-        type=float,
+        type=number,
         metavar="METRES",
         help="distance between the wheels: needed for differential-drive, in place of its own for any other drive",
     )

@@ -14,6 +14,14 @@ from bns.errors import SpecError
 from bns.spec import FIELDS, evolvable, field_type
 
 
+def number(text: str) -> float:
+    """A number, written with a point."""
+    try:
+        return float(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number; write it with digits and a point, such as 0.0884") from error
+
+
 def positive(text: str) -> int:
     """A whole number of 1 or more."""
     if not text.isdecimal() or int(text) < 1:

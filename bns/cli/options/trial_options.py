@@ -7,6 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from bns.cli.options.option_types import number
+
 Convert = Callable[[str], Any]
 
 
@@ -18,7 +20,7 @@ def add_trial_options(parser: argparse.ArgumentParser, positive: Convert) -> Non
     parser.add_argument("--emulated", **switch, help="drive the emulator of the robot: the same drivers, no hardware")  # type: ignore[arg-type]
     parser.add_argument(
         "--speed",
-        type=float,
+        type=number,
         default=1.0,
         metavar="X",
         help="speed of the emulated clock, in multiples of real time (default: 1)",
@@ -101,17 +103,17 @@ def add_looking_options(
     calibrating.add_argument(
         "--places", type=positive, default=3, metavar="N", help="number of places on the floor for the board (default: 3)"
     )
-    calibrating.add_argument("--measured-mm", type=float, metavar="MM", help="measured width of the whole printed board, in mm")
+    calibrating.add_argument("--measured-mm", type=number, metavar="MM", help="measured width of the whole printed board, in mm")
     calibrating.add_argument("--size", metavar="WxH", help="size of the camera's pictures (default: 1280x720 if available)")
     for name in ("exposure", "focus", "white-balance"):
         calibrating.add_argument(
             f"--{name}",
-            type=float,
+            type=number,
             metavar="N",
             help="fixed value, in units of the camera's driver (v4l2-ctl -L lists the range)",
         )
     calibrating.add_argument(
-        "--square-mm", type=float, default=68.0, metavar="MM", help="side of a printed square in mm (default: 68, for A3)"
+        "--square-mm", type=number, default=68.0, metavar="MM", help="side of a printed square in mm (default: 68, for A3)"
     )
     calibrating.add_argument("--views", type=positive, default=15, metavar="N", help="number of views to take (default: 15)")
     calibrating.add_argument(
