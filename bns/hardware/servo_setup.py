@@ -91,10 +91,10 @@ class OnTheBus(NamedTuple):
 
 
 class ServoBus:
-    """A bus opened to set servos up; no other process can have it meanwhile."""
+    """A bus opened to set servos up; no other process can have it meanwhile. `say` is told what becomes of a servo's torque."""
 
-    def __init__(self, port: str, clock: Clock) -> None:
-        self.port, self._clock = port, clock
+    def __init__(self, port: str, clock: Clock, say: Callable[[str], None] = lambda _text: None) -> None:
+        self.port, self._clock, self._say = port, clock, say
         self._packets = {protocol: PacketHandler(float(protocol)) for protocol in PROTOCOLS}
         self._line, self._baud = ClockedPort(port, clock), 0
         self._bits = 0
@@ -176,10 +176,7 @@ class ServoBus:
         try:
             return self._numbered(servo, new)
         except HardwareError as error:
-            raise HardwareError(
-                f"{error} The servo may have the id {new} by now, or still {servo.number}: switch it off and on, "
-                "then bns servos scan tells."
-            ) from error
+            raise HardwareError(f"{error} {_as_it_may_be(servo, new)}") from error
 
     def _numbered(self, servo: OnTheBus, new: int) -> OnTheBus:
         """Its number and rate written, and seen to be so."""
@@ -295,6 +292,7 @@ class ServoBus:
         # X series take settings only so; an AX-12 that leaves wheel mode would turn to an old goal as fast as it can
         if address < table.registers["torque_enable"].address and self.read(servo, "torque_enable"):
             self.write(servo, "torque_enable", 0)
+            self._say(f"servo {servo.number}: its torque was on and is switched off: its joint is limp now")
         data = list(value.to_bytes(size, "little"))
         self.at(servo.baud)
         packets = self._packets[servo.protocol]
@@ -358,6 +356,16 @@ class ServoBus:
             if answer[1] == COMM_SUCCESS:
                 break
         return answer
+
+
+def _as_it_may_be(servo: OnTheBus, new: int) -> str:
+    """What is known of a servo that could not be given a number and the rate of a chain to the end."""
+    by_now = [f"the id {new} by now, or still {servo.number}"] * (new != servo.number)
+    by_now += [f"{BAUD} baud by now, or still {servo.baud}"] * (servo.baud != BAUD)
+    if not by_now:
+        return "Neither its id nor its rate was to be changed: check its cable and the supply, then try again."
+    scan = "bns servos scan" + " --all-bauds" * (servo.baud != BAUD)
+    return f"The servo may have {'; '.join(by_now)}: switch it off and on, then {scan} tells."
 
 
 def adapter(port: str, root: Path = Path("/sys/class/tty")) -> Iterator[Finding]:

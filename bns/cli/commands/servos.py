@@ -13,7 +13,7 @@ from bns.hardware.servos.snake_settings import snake_settings
 
 def served(options: argparse.Namespace) -> int:
     """Carry out one of them; 0 if all is fine, else 2."""
-    bus = ServoBus(options.port, RealClock())
+    bus = ServoBus(options.port, RealClock(), lambda text: print(f"bns: {text}", file=sys.stderr))
     try:
         return _PARTS[options.part](bus, options)
     finally:

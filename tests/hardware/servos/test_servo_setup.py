@@ -138,11 +138,14 @@ def test_settings_are_written_with_the_torque_off(bus, capsys, monkeypatch, aske
         return write(self, address, data)
 
     monkeypatch.setattr(Servo, "write", noted)
-    call(capsys, *asked, "--protocol", 1, "--port", port)
+    _, said = call(capsys, *asked, "--protocol", 1, "--port", port)
     settings = [torque for address, torque in written if address < AX12.registers["torque_enable"].address]
     assert settings
     assert not any(settings)
     assert servo.get("torque_enable") == 0
+    assert "bns: servo 1: its torque was on and is switched off: its joint is limp now\n" in said.err
+    _, said = call(capsys, "check", "--fix", "--protocol", 1, "--port", port)
+    assert "torque was on" not in said.err
 
 
 def test_a_number_that_was_written_and_not_seen_is_told(bus, capsys, monkeypatch):
@@ -158,6 +161,31 @@ def test_a_number_that_was_written_and_not_seen_is_told(bus, capsys, monkeypatch
     assert (code, servo.get("id")) == (2, 7)
     assert "servo 7 does not answer" in said.err
     assert "The servo may have the id 7 by now, or still 1: switch it off and on, then bns servos scan tells." in said.err
+
+
+@pytest.mark.parametrize(
+    ("baud", "told"),
+    [
+        (1_000_000, "Neither its id nor its rate was to be changed: check its cable and the supply, then try again."),
+        (57_600, "may have 1000000 baud by now, or still 57600: switch it off and on, then bns servos scan --all-bauds tells."),
+    ],
+    ids=["as it is", "another rate"],
+)
+def test_a_servo_that_keeps_its_number_and_is_lost_is_not_said_to_have_one_of_two(bus, capsys, monkeypatch, baud, told):
+    (servo,), port = bus(7)
+    numbered, scan = ServoBus._numbered, ServoBus.scan
+
+    def lost(self, found, new):
+        servo.put("status_return", 0)
+        servo.put("id", 9)
+        return numbered(self, found, new)
+
+    monkeypatch.setattr(ServoBus, "_numbered", lost)
+    monkeypatch.setattr(ServoBus, "scan", lambda *asked: (found._replace(baud=baud) for found in scan(*asked)))
+    code, said = call(capsys, "set-id", 7, "--from", 7, "--protocol", 1, "--port", port)
+    assert code == 2
+    assert said.err.endswith(f"{told}\n")
+    assert "the id 7" not in said.err
 
 
 def test_nobody_to_be_numbered_is_said_to_be_nobody(bus, capsys):
