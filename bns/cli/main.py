@@ -44,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         take_trust(options)
         return _flushed(int(options.command(options)))
     except BnsError as error:
-        print(f"bns: {error}", file=sys.stderr)
+        _say(f"bns: {error}")
         return error.exit_code
     except KeyboardInterrupt:
         print("bns: interrupted", file=sys.stderr)
@@ -72,6 +72,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _flushed(code: int) -> int:
     sys.stdout.flush()  # a full disk or a closed pipe shows here, not when the process ends
     return code
+
+
+def _say(text: str) -> None:
+    """Last words, on stderr. Where outputs cannot be written (a full disk), the exit code alone tells, and is kept."""
+    for stream, words in ((sys.stdout, ""), (sys.stderr, f"{text}\n")):
+        try:
+            stream.write(words)
+            stream.flush()
+        except OSError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _shown_once() -> Callable[..., None]:
