@@ -192,6 +192,27 @@ def test_the_exit_code_is_told_where_nothing_can_be_said(tmp_path):
         assert subprocess.run(asked, stdout=full, stderr=full, check=False, timeout=600).returncode == 2
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
+@pytest.mark.parametrize(
+    ("streams", "kept"), [(("stdout",), 2), (("stderr",), 0), (("stdout", "stderr"), 0)], ids=["report", "notes", "both"]
+)
+@pytest.mark.slow
+def test_a_trial_whose_outputs_cannot_be_written_does_not_say_that_nothing_has_moved(tmp_path, streams, kept):
+    """A note is told after the first drive."""
+    drives = tmp_path / "commands.csv"
+    drives.write_text("trial,left_m_s,right_m_s,duration_s\n1,0.005,0.005,1\n2,0.005,0.005,1\n")
+    asked = [sys.executable, "-m", "bns", "trial", "--robot", "khepera", "--emulated", "--yes", "--speed", "inf"]
+    with open("/dev/full", "w") as full:  # noqa: PTH123  # of no other use
+        outputs = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | dict.fromkeys(streams, full)
+        done = subprocess.run(
+            [*asked, "--results", tmp_path, "--commands", drives], **outputs, text=True, check=False, timeout=600
+        )
+    assert done.returncode == 5
+    assert len(past_evaluations(journal_of(tmp_path))) == kept
+    if "stderr" not in streams:
+        assert "cannot write the output: No space left on device. The robot stands still" in done.stderr
+
+
 def test_what_a_trial_ended_with_is_not_hidden_by_its_tables(tmp_path, monkeypatch, capsys):
     def nothing(*_):
         raise TrialFileError("cannot write the table")
