@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 
 from bns.hardware.clock import RealClock
-from bns.hardware.servo_setup import PROTOCOLS, Rate, ServoBus, adapter, rates
+from bns.hardware.servo_setup import NO_SERVO, PROTOCOLS, Rate, ServoBus, adapter, rates
 from bns.hardware.servos.snake_settings import snake_settings
 
 
@@ -31,7 +31,7 @@ def scan(bus: ServoBus, options: argparse.Namespace) -> int:
     more = "" if options.all_bauds else " (1 Mbaud and new ones; --all-bauds tries others)"
     print(f"{len(found)} ids answer{more}" if found else f"no servo answers{more}; is the supply on, is the cable connected?")
     if found and not any(servo.model for servo in found):
-        print("no answer is one of a servo: is this the port of the bus, and its rate? A line without servos may be noisy, too")
+        print(f"no answer is one of a servo: {NO_SERVO}")
     return 0 if found and all(servo.model > 0 for servo in found) else 2
 
 

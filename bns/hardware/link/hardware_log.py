@@ -41,7 +41,7 @@ class HardwareLog:
     def __init__(self, path: Path | None, clock: Clock) -> None:
         self._clock, self._path = clock, path
         self._descriptor: int | None = None
-        self._held, self._written_s = bytearray(), clock.now_s()
+        self._held, self._written_s = bytearray(), 0.0
         self._fault: OSError | None = None
         self.held_up_s = 0.0
         """How long the disk has held up whoever notes something, in all: a robot that is stopped meanwhile is not to blame."""

@@ -109,6 +109,37 @@ def test_an_adapter_that_echoes_changes_nothing(bus, capsys, monkeypatch):
     assert [s.get("return_delay") for s in servos] == [0, 0, 0]
 
 
+def test_an_echo_that_does_not_come_is_nobody_s_answer(bus, capsys, monkeypatch):
+    """On a busy computer it was taken for two servos of one id."""
+    _, port = bus(1, 2)
+    bus.bus.echoes = True
+    unsent, write = [4], ClockedPort.writePort
+
+    def writes(self, packet):
+        if packet[2] != 9 or not unsent[0]:
+            return write(self, packet)
+        unsent[0] -= 1
+        return 0
+
+    monkeypatch.setattr(ClockedPort, "writePort", writes)
+    code, said = call(capsys, "scan", "--protocol", 1, "--port", port)
+    assert (code, said.out.splitlines()[-1]) == (0, "2 ids answer (1 Mbaud and new ones; --all-bauds tries others)")
+    unsent[0] = 99
+    code, said = call(capsys, "scan", "--protocol", 1, "--port", port)
+    assert code == 2
+    assert "echoed what it was sent, and does not any more: 5 packets did not come back. Is the computer too busy?" in said.err
+
+
+def test_a_noisy_line_is_not_said_to_have_dozens_of_doubled_servos(bus, capsys):
+    _, port = bus(1, 1, 2, 2, 3, 3, 4, 4)
+    code, said = call(capsys, "set-id", 7, "--protocol", 1, "--port", port)
+    assert code == 2
+    assert said.err == (
+        "bns: 4 ids seem to answer, and none as a servo does: is this the port of the bus, and its rate? "
+        "A line without servos may be noisy, too.\n"
+    )
+
+
 @pytest.mark.parametrize("kind", [AX12, XL430_W250], ids=lambda kind: kind.model)
 def test_check_shows_an_alarm_that_has_not_gone(bus, capsys, kind):
     servos, port = bus(1, 2, kind=kind, return_delay=0, baud_rate=kind.bauds[1_000_000])
