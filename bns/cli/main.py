@@ -26,7 +26,7 @@ from bns.cli.options.sweep_options import DEVICES, say_if_experimental
 from bns.cli.options.trial_options import add_looking_options, add_servo_options, add_trial_options
 from bns.cli.parser import SHELLS, Adder, Completion, Parser, add_results, add_trust, take_trust
 from bns.cli.streams import usable_streams
-from bns.errors import BnsError
+from bns.errors import BnsError, TrialFileError
 from bns.spec import FIELDS, RunSpec
 
 SWEEP_OF_SINGLE_RUNS = "by-hand"
@@ -44,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         take_trust(options)
         return _flushed(int(options.command(options)))
     except BnsError as error:
-        print(f"bns: {error}", file=sys.stderr)
+        _say(f"bns: {error}")
         return error.exit_code
     except KeyboardInterrupt:
         print("bns: interrupted", file=sys.stderr)
@@ -57,8 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return BnsError.exit_code
     except OSError as error:
         if error.errno in _FULL:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            print(f"bns: cannot write {error.filename or 'the output'}: {error.strerror}", file=sys.stderr)
+            _say(f"bns: cannot write {error.filename or 'the output'}: {error.strerror}")
         elif error.errno in _NO_PLACE and error.filename is not None:
             print(
                 f"bns: cannot use {error.filename}: {error.strerror}. Choose another place.",
@@ -72,6 +71,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _flushed(code: int) -> int:
     sys.stdout.flush()  # a full disk or a closed pipe shows here, not when the process ends
     return code
+
+
+def _say(text: str) -> None:
+    """Last words, on stderr. Where outputs cannot be written (a full disk), the exit code alone tells, and is kept."""
+    for name, words in (("stdout", ""), ("stderr", text)):
+        try:
+            print(words, end="\n" * bool(words), file=getattr(sys, name), flush=True)
+        except OSError:
+            setattr(sys, name, None)  # else Python tries once more when it ends, and fails with a code of its own
 
 
 def _shown_once() -> Callable[..., None]:
@@ -193,7 +201,13 @@ def trial(options: argparse.Namespace) -> int:
     from bns.cli.commands.trial import carried_out
 
     say_if_compiling()
-    print(carried_out(options, {name: getattr(options, name) for name in FIELDS if name != "world"}))
+    report = carried_out(options, {name: getattr(options, name) for name in FIELDS if name != "world"})
+    try:
+        print(report, flush=True)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise TrialFileError.of("the output", error) from error
     return 0
 
 

@@ -22,6 +22,8 @@ _MOST_S = {"lost_s": 10.0, "picture_s": 10.0, "disagree_s": 10.0, "late_s": 30.0
 """More would be no limit: a robot drives metres meanwhile. Most likely it was meant in milliseconds."""
 _MOST_M = 100.0
 """A longer surface was most likely meant in centimetres or millimetres."""
+_MOST_RAD = 3.15
+"""Half a turn, rounded up. More is no limit, and most likely degrees."""
 _KEYS = (*_NEEDED, *_MOST_S, "placed_within_m", "placed_within_rad", "driver")
 
 
@@ -98,6 +100,14 @@ def _rig(content: Mapping[str, Any], where: str, lines: Lines) -> Rig:
         raise HardwareError(
             f"{at['driver']}: driver is {shown(driver)}; it holds the settings of the robot's driver, name: value."
         )
+    if near_rad > _MOST_RAD:
+        most = "at most π. It is in radians, not degrees: 20° are 0.35."
+        raise HardwareError(f"{at['placed_within_rad']}: placed_within_rad is {near_rad:g}; {most}")
+    surface = limits.surface
+    longest_m = max(surface.x_high_m - surface.x_low_m, surface.y_high_m - surface.y_low_m)
+    if "placed_within_m" in content and near_m > longest_m:
+        most = f"at most {longest_m:g}, the length of surface_m. It is in metres."
+        raise HardwareError(f"{at['placed_within_m']}: placed_within_m is {near_m:g}; {most}")
     return Rig(str(content["robot"]), str(content["port"]), tracker, limits, near_m, driver, near_rad)
 
 

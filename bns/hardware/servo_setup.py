@@ -26,7 +26,7 @@ from bns.hardware.servos.snake_settings import limits_of
 from bns.physics.snake.gait import GREATEST_RAD
 
 with extra("robot"):
-    from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, INST_PING, PacketHandler
+    from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, COMM_TX_FAIL, INST_PING, PacketHandler
 
 PROTOCOLS = (1, 2)
 _LAST_ID = 252
@@ -35,10 +35,15 @@ _MOST_DELAY = 25
 _EEPROM_S = 0.02
 _ANSWERS_ALL = 2
 _SURE = 3
+_MOST_UNSENT = 5
+"""A busy computer holds an echo up; an adapter that has none any more is broken."""
 _ALL_ANSWER_S = 0.8
 """So long, by the makers' SDK, after a ping to all the last servo may begin to answer: 3 ms a number, and 16."""
 MUTE = -1
 _MUTE = "answers a ping and nothing else (status return level 0)"
+_MOST_DOUBLED = 3
+"""New servos all have id 1: so many garbled ids and no other are no doubled ones, but noise."""
+NO_SERVO = "is this the port of the bus, and its rate? A line without servos may be noisy, too."
 _NAMES = {"return_delay": "return delay", "status_return": "status return level"}
 
 
@@ -91,10 +96,10 @@ class OnTheBus(NamedTuple):
 
 
 class ServoBus:
-    """A bus opened to set servos up; no other process can have it meanwhile."""
+    """A bus opened to set servos up; no other process can have it meanwhile. `say` is told what becomes of a servo's torque."""
 
-    def __init__(self, port: str, clock: Clock) -> None:
-        self.port, self._clock = port, clock
+    def __init__(self, port: str, clock: Clock, say: Callable[[str], None] = lambda _text: None) -> None:
+        self.port, self._clock, self._say = port, clock, say
         self._packets = {protocol: PacketHandler(float(protocol)) for protocol in PROTOCOLS}
         self._line, self._baud = ClockedPort(port, clock), 0
         self._bits = 0
@@ -167,6 +172,8 @@ class ServoBus:
                 f"no servo answers{'' if old is None else f', and none has the id {old} at another rate'}. Is the supply on, is "
                 "the cable connected? One at another rate: bns servos scan --all-bauds finds it, --from ID takes it from there."
             )
+        if len(there) > _MOST_DOUBLED and not any(servo.model for servo in there):
+            raise HardwareError(f"{len(there)} ids seem to answer, and none as a servo does: {NO_SERVO}")
         if len(meant) != 1 or not meant[0].model:
             which = "Connect one servo alone" if old is None else f"No single servo has the id {old}"
             raise HardwareError(f"{which}: {'; '.join(map(str, there))}. Name one of several with --from ID.")
@@ -176,10 +183,7 @@ class ServoBus:
         try:
             return self._numbered(servo, new)
         except HardwareError as error:
-            raise HardwareError(
-                f"{error} The servo may have the id {new} by now, or still {servo.number}: switch it off and on, "
-                "then bns servos scan tells."
-            ) from error
+            raise HardwareError(f"{error} {_as_it_may_be(servo, new)}") from error
 
     def _numbered(self, servo: OnTheBus, new: int) -> OnTheBus:
         """Its number and rate written, and seen to be so."""
@@ -295,6 +299,7 @@ class ServoBus:
         # X series take settings only so; an AX-12 that leaves wheel mode would turn to an old goal as fast as it can
         if address < table.registers["torque_enable"].address and self.read(servo, "torque_enable"):
             self.write(servo, "torque_enable", 0)
+            self._say(f"servo {servo.number}: its torque was on and is switched off: its joint is limp now")
         data = list(value.to_bytes(size, "little"))
         self.at(servo.baud)
         packets = self._packets[servo.protocol]
@@ -347,17 +352,42 @@ class ServoBus:
     def _asked(self, call: Callable[[], tuple[int, int, int]], attempts: int = 2) -> tuple[int, int, int]:
         answer = (0, COMM_RX_TIMEOUT, 0)
         for _ in range(attempts):
-            try:
-                answer = call()
-            except IndexError:  # the SDK reads past the end of a status packet that is too short
-                answer = (0, COMM_RX_TIMEOUT + 1, 0)
-            except (OSError, TerminalError) as error:
-                raise HardwareError(f"the port {self.port} is gone ({error}).") from error
-            finally:
-                self._line.is_using = False
+            answer = self._sent(call)
             if answer[1] == COMM_SUCCESS:
                 break
         return answer
+
+    def _sent(self, call: Callable[[], tuple[int, int, int]]) -> tuple[int, int, int]:
+        """What a call answers whose packet came back, where the adapter echoes: else it counts as not sent, and nobody has
+        answered it."""
+        for _ in range(_MOST_UNSENT):
+            answer = self._once(call)
+            if answer[1] != COMM_TX_FAIL:
+                return answer
+        raise HardwareError(
+            f"the adapter at {self.port} echoed what it was sent, and does not any more: {_MOST_UNSENT} packets did not come "
+            "back. Is the computer too busy? End other programs, plug the adapter in again."
+        )
+
+    def _once(self, call: Callable[[], tuple[int, int, int]]) -> tuple[int, int, int]:
+        try:
+            return call()
+        except IndexError:  # the SDK reads past the end of a status packet that is too short
+            return 0, COMM_RX_TIMEOUT + 1, 0
+        except (OSError, TerminalError) as error:
+            raise HardwareError(f"the port {self.port} is gone ({error}).") from error
+        finally:
+            self._line.is_using = False
+
+
+def _as_it_may_be(servo: OnTheBus, new: int) -> str:
+    """What is known of a servo that could not be given a number and the rate of a chain to the end."""
+    by_now = [f"the id {new} by now, or still {servo.number}"] * (new != servo.number)
+    by_now += [f"{BAUD} baud by now, or still {servo.baud}"] * (servo.baud != BAUD)
+    if not by_now:
+        return "Neither its id nor its rate was to be changed: check its cable and the supply, then try again."
+    scan = "bns servos scan" + " --all-bauds" * (servo.baud != BAUD)
+    return f"The servo may have {'; '.join(by_now)}: switch it off and on, then {scan} tells."
 
 
 def adapter(port: str, root: Path = Path("/sys/class/tty")) -> Iterator[Finding]:

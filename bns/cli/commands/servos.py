@@ -7,13 +7,13 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 
 from bns.hardware.clock import RealClock
-from bns.hardware.servo_setup import PROTOCOLS, Rate, ServoBus, adapter, rates
+from bns.hardware.servo_setup import NO_SERVO, PROTOCOLS, Rate, ServoBus, adapter, rates
 from bns.hardware.servos.snake_settings import snake_settings
 
 
 def served(options: argparse.Namespace) -> int:
     """Carry out one of them; 0 if all is fine, else 2."""
-    bus = ServoBus(options.port, RealClock())
+    bus = ServoBus(options.port, RealClock(), lambda text: print(f"bns: {text}", file=sys.stderr))
     try:
         return _PARTS[options.part](bus, options)
     finally:
@@ -31,7 +31,7 @@ def scan(bus: ServoBus, options: argparse.Namespace) -> int:
     more = "" if options.all_bauds else " (1 Mbaud and new ones; --all-bauds tries others)"
     print(f"{len(found)} ids answer{more}" if found else f"no servo answers{more}; is the supply on, is the cable connected?")
     if found and not any(servo.model for servo in found):
-        print("no answer is one of a servo: is this the port of the bus, and its rate? A line without servos may be noisy, too")
+        print(f"no answer is one of a servo: {NO_SERVO}")
     return 0 if found and all(servo.model > 0 for servo in found) else 2
 
 

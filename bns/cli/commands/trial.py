@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from bns.api.trial import driven, trial_setup, trial_spec
-from bns.errors import TrialPausedError
+from bns.errors import TrialFileError, TrialPausedError
 from bns.trial.again.replay import replayed
 from bns.trial.experiment import drive_commands
 from bns.trial.session import TrialSetup
@@ -26,6 +26,10 @@ def carried_out(options: argparse.Namespace, parameters: Mapping[str, Any]) -> s
         if "--resume" in str(why):
             raise
         raise TrialPausedError(f"{why} (paused, the robot stands: the same command with --resume goes on)") from why
+    except OSError as error:
+        if error.filename is not None:  # the command line tells of files and folders by their names
+            raise
+        raise TrialFileError.of("the output", error) from error
 
 
 def setup_of(options: argparse.Namespace) -> TrialSetup:

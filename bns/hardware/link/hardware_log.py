@@ -29,8 +29,8 @@ from bns.errors import HardwareError, TrialFileError
 from bns.hardware.clock import Clock
 from bns.hardware.link.sealed_lines import Seals, checked_lines
 
-_HELD = 1 << 13
-"""Bytes that are kept back before they are written."""
+_HELD, _HELD_S = 1 << 13, 0.1
+"""Bytes that are kept back before they are written, and for how long at most: whether the disk takes them is known only then."""
 _HANGS_S = 0.5
 """A disk that takes so long hangs: a network folder whose server is away, a stick that is full or failing."""
 
@@ -41,7 +41,7 @@ class HardwareLog:
     def __init__(self, path: Path | None, clock: Clock) -> None:
         self._clock, self._path = clock, path
         self._descriptor: int | None = None
-        self._held = bytearray()
+        self._held, self._written_s = bytearray(), 0.0
         self._fault: OSError | None = None
         self.held_up_s = 0.0
         """How long the disk has held up whoever notes something, in all: a robot that is stopped meanwhile is not to blame."""
@@ -59,7 +59,8 @@ class HardwareLog:
         if self._descriptor is not None and self._fault is None:
             event = {"t_s": round(self._clock.now_s(), 6), "wall_s": round(time.time(), 6), "kind": kind, **what}
             self._held += self._seals.line(json.dumps(event, separators=(",", ":"), allow_nan=False)).encode()
-            if len(self._held) > _HELD:
+            if len(self._held) > _HELD or event["t_s"] - self._written_s > _HELD_S:
+                self._written_s = event["t_s"]
                 self._write()
 
     def check(self) -> None:

@@ -143,6 +143,8 @@ def no_port(port: str) -> str:
 
 def why_not_opened(port: str, error: OSError) -> str:
     """Why a port that is there cannot be opened, and what to try."""
+    if error.errno in {errno.EMFILE, errno.ENFILE}:  # before whatever would open a file to find out more
+        return f"{port} cannot be opened: too many files are open already. End other programs, or allow more (ulimit -n)."
     if error.errno == errno.EACCES or not os.access(port, os.R_OK | os.W_OK):
         return (
             f"no permission to use {port}. Add yourself to the group that owns it (often dialout: "

@@ -36,7 +36,14 @@ from bns.hardware.servos.bridge_frames import (
     encoded,
     searched,
 )
-from bns.hardware.servos.servo_chain import Health, RestartedServoError, ServoError, ServoLimits, narrow
+from bns.hardware.servos.servo_chain import (
+    Health,
+    RestartedServoError,
+    ServoAlarmError,
+    ServoError,
+    ServoLimits,
+    narrow,
+)
 from bns.hardware.stop import Stop
 
 with extra("robot"):
@@ -137,7 +144,7 @@ class BridgeChain:
             if bits & NO_ANSWER:
                 raise ServoError(f"servo {place} does not answer the bridge")
             if bits:
-                raise ServoError(f"servo {place}: {', '.join(errors_in(bits))}")
+                raise ServoAlarmError(place, ", ".join(errors_in(bits)))
             share = (load & 1023) / 1023 * (-1 if load & 1024 else 1)
             found[place] = Health((position - CENTRE) * RAD_PER_STEP, share, decivolts / 10, float(celsius))
         self.limits.check(found)

@@ -90,7 +90,7 @@ class DynamixelChain:
         try:
             return self._setting_that_is_wrong(number)
         except ServoAlarmError as error:
-            return f"{error}; fix the cause, then switch the servos off and on"
+            return str(error)
         except ServoError as error:
             if "corrupt" in str(error):
                 return f"servo {number}: answers are garbled; two servos may have this id ({error})"
@@ -154,7 +154,7 @@ class DynamixelChain:
             elif result == COMM_SUCCESS:
                 if bits & ~self.table.alarm_bits or (bits and not alarms):
                     alarm = self.table.in_words(bits, self._hardware_error(number, bits))
-                    raise ServoAlarmError(f"servo {number}: {alarm}")
+                    raise ServoAlarmError(number, alarm)
                 return data
             else:
                 problem = problem or str(self._packets.getTxRxResult(result))

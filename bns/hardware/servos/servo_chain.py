@@ -18,6 +18,9 @@ class ServoError(Exception):
 class ServoAlarmError(ServoError):
     """A servo that answers, with an alarm."""
 
+    def __init__(self, number: int, alarm: str) -> None:
+        super().__init__(f"servo {number}: {alarm}; fix the cause, then switch the servos off and on")
+
 
 class StuckServoError(ServoError):
     """A servo that has been at the limit of its torque for too long: something holds its joint, most often the body itself."""

@@ -21,6 +21,14 @@ _CHARGED_V = 0.5
 """Above what the makers allow: for the servo's own reading, and for a battery that has just been charged."""
 _REFUSED_V = 1.0
 """So much above it, no rig may allow."""
+_MOST: Mapping[str, tuple[float, str]] = {
+    "settle_s": (10.0, "in seconds, not milliseconds"),
+    "stalled_s": (10.0, "in seconds, not milliseconds"),
+    "stuck_s": (10.0, "in seconds, not milliseconds"),
+    "temperature_c": (85.0, "in degrees Celsius"),
+    "load": (1.0, "a fraction of the permitted torque"),
+}
+"""More would be no limit, or wait for ever; and the unit in which it was most likely not meant."""
 _LIMITS = tuple(limit.name for limit in dataclasses.fields(ServoLimits))
 
 
@@ -53,10 +61,16 @@ def snake_settings(driver: Mapping[str, Any]) -> SnakeSettings:
         raise HardwareError(f"the snake's torque is {limits.torque:g}; it is a fraction of the servos' highest, above 0 up to 1.")
     if limits.high_v >= table.volts[1] + _REFUSED_V:
         raise HardwareError(f"the snake's high_v is {limits.high_v:g}; the servos' makers allow {table.volts[1]:g} V.")
+    if limits.low_v >= limits.high_v:
+        raise HardwareError(f"the snake's low_v is {limits.low_v:g}, and high_v {limits.high_v:g}; low_v must be the lower one.")
+    speed_rad_s = _number("joint_speed_rad_s", driver.get("joint_speed_rad_s", model.joint_speed_rad_s))
+    if speed_rad_s > table.no_load_rad_s:
+        fastest = f"without load the {table.model} turns at {table.no_load_rad_s:.1f}. It is in radians a second, not degrees."
+        raise HardwareError(f"the snake's joint_speed_rad_s is {speed_rad_s:g}; {fastest}")
     return SnakeSettings(
         wiring,
         _ids(driver.get("ids", list(range(1, model.joints + 1))), model.joints),
-        _number("joint_speed_rad_s", driver.get("joint_speed_rad_s", model.joint_speed_rad_s)),
+        speed_rad_s,
         _number("settle_s", driver.get("settle_s", model.settle_s)),
         limits,
         table,
@@ -94,4 +108,7 @@ def _ids(given: Any, joints: int) -> tuple[int, ...]:
 def _number(name: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
         raise HardwareError(f"the snake's {name} is {value!r}; it must be a number above 0.")
+    most, unit = _MOST.get(name, (math.inf, ""))
+    if value > most:
+        raise HardwareError(f"the snake's {name} is {value:g}; at most {most:g}. It is {unit}.")
     return float(value)

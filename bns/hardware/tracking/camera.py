@@ -123,9 +123,17 @@ class StreamCamera:
         self._frame, self.gone = None, f"the camera {self._source} {how}; bns track shows what it sees"
 
     def _read(self) -> None:
+        try:
+            self._take_frames()
+        except Exception as error:  # of whoever decodes pictures; unseen, the last one would only grow old
+            self._lost(f"failed ({type(error).__name__}: {str(error).strip()}). Connect it again")
+        finally:
+            self._capture.release()
+
+    def _take_frames(self) -> None:
         while self._open:
             good, picture = self._capture.read()
-            if not good:  # unplugged: the last frame must not be taken for a new one
+            if not good or picture is None:  # unplugged: the last frame must not be taken for a new one
                 self._lost("is gone: it was unplugged, or its stream has ended. Connect it again")
                 break
             if self._frame is not None and picture.shape != self._frame.picture.shape:
@@ -136,7 +144,6 @@ class StreamCamera:
                 self._frame = Frame(self._filmed_s(), picture)
             self._arrived.set()
             self._clock.arrived()
-        self._capture.release()
 
 
 class FrameTracker:

@@ -46,6 +46,8 @@ Pose = Callable[[float], np.ndarray]
 DELAY = "delay_s"
 """A setting of every kind: how much older than its time stamp a pose is (`bns calibrate --delay` measures it)."""
 _MOST_DELAY_S = 1.0
+_MOST_SIZE = {"_m": (20.0, "in metres, not millimetres"), "_rad": (math.pi, "in radians, not degrees")}
+"""End of a size's name -> more than it can be, and its unit."""
 
 
 def delay_of(settings: Mapping[str, Any]) -> float:
@@ -98,4 +100,7 @@ def checked(settings: Mapping[str, Any]) -> Mapping[str, Any]:
         value = own.get(name, 1.0)
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
             raise HardwareError(f"the {kind} tracker: {name} is {value!r}; it must be a number above 0.")
+        most, unit = next((limit for end, limit in _MOST_SIZE.items() if name.endswith(end)), (math.inf, ""))
+        if value > most:
+            raise HardwareError(f"the {kind} tracker: {name} is {value:g}; at most {most:.3g}. It is {unit}.")
     return own

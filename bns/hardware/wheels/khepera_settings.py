@@ -12,6 +12,8 @@ from bns.hardware.link.reply_time import ReplyLimits
 
 _REPLIES = {"first_reply_s": "first_s", "least_reply_s": "least_s", "most_reply_s": "most_s"}
 _KNOWN = (*_REPLIES, "stop_s")
+_MOST_S = 60.0
+"""More would be no limit: a robot that has gone silent drives metres meanwhile."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,9 @@ def khepera_settings(driver: Mapping[str, Any]) -> KheperaSettings:
     for name, value in driver.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
             raise HardwareError(f"the Khepera's {name} is {value!r}; it must be a number of seconds above 0.")
+        if value > _MOST_S:
+            most = f"at most {_MOST_S:g}. It is in seconds, not milliseconds."
+            raise HardwareError(f"the Khepera's {name} is {value:g} s; {most}")
     limits = ReplyLimits(**{ours: float(driver[name]) for name, ours in _REPLIES.items() if name in driver})
     if limits.least_s > limits.most_s:
         raise HardwareError(

@@ -31,6 +31,10 @@ _RESTARTED = (
     "the robot has restarted during the drive: its counters of the wheels began again at zero. Its battery is low, worn or "
     "loose, or its switch was touched: charge it, see that it sits firmly"
 )
+_LEAPT = (
+    "the counters of the robot's wheels leapt by {0:.1f} m during the drive, and can have turned by {1:.1f} m at most: its "
+    "answers are wrong, or another program set the counters. Bring it nearer, and see what it answers: bns doctor --rig FILE"
+)
 _NOT_SEEN = "the tracker does not see the robot: is it lit, marked and on the surface? Try: bns track"
 
 
@@ -214,6 +218,9 @@ class WheeledPlatform:
             return
         ordered_m, furthest_m = drive.ordered_m()
         turned_m = _TURNED_M + _OFF_SHARE * furthest_m
+        leapt_m = float(np.abs(now_m - before_m).max())
+        if leapt_m > furthest_m and np.abs(now_m).max() > furthest_m:  # a robot that restarted has driven on from zero
+            raise TrialPausedError(_LEAPT.format(leapt_m, furthest_m)) from error
         away = np.minimum(np.abs(before_m + ordered_m), np.abs(before_m + drive.told_m)) > turned_m
-        if np.abs(now_m - before_m).max() > furthest_m or (np.abs(now_m).max() < _AT_ZERO_M and away.any()):
+        if leapt_m > furthest_m or (np.abs(now_m).max() < _AT_ZERO_M and away.any()):
             raise TrialPausedError(_RESTARTED) from error

@@ -216,7 +216,7 @@ def test_a_silent_servo_is_not_stopped(bridge):
 def test_alarms_are_errors(bridge, clock):
     driver, _ = bridge(Fault("overload", at_s=0.5, for_s=1.0, servo=3))
     clock.sleep(0.6)
-    with pytest.raises(ServoError, match="servo 3: overload"):
+    with pytest.raises(ServoError, match="servo 3: overload; fix the cause, then switch the servos off and on"):
         driver.health()
 
 

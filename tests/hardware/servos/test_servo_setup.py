@@ -109,6 +109,37 @@ def test_an_adapter_that_echoes_changes_nothing(bus, capsys, monkeypatch):
     assert [s.get("return_delay") for s in servos] == [0, 0, 0]
 
 
+def test_an_echo_that_does_not_come_is_nobody_s_answer(bus, capsys, monkeypatch):
+    """On a busy computer it was taken for two servos of one id."""
+    _, port = bus(1, 2)
+    bus.bus.echoes = True
+    unsent, write = [4], ClockedPort.writePort
+
+    def writes(self, packet):
+        if packet[2] != 9 or not unsent[0]:
+            return write(self, packet)
+        unsent[0] -= 1
+        return 0
+
+    monkeypatch.setattr(ClockedPort, "writePort", writes)
+    code, said = call(capsys, "scan", "--protocol", 1, "--port", port)
+    assert (code, said.out.splitlines()[-1]) == (0, "2 ids answer (1 Mbaud and new ones; --all-bauds tries others)")
+    unsent[0] = 99
+    code, said = call(capsys, "scan", "--protocol", 1, "--port", port)
+    assert code == 2
+    assert "echoed what it was sent, and does not any more: 5 packets did not come back. Is the computer too busy?" in said.err
+
+
+def test_a_noisy_line_is_not_said_to_have_dozens_of_doubled_servos(bus, capsys):
+    _, port = bus(1, 1, 2, 2, 3, 3, 4, 4)
+    code, said = call(capsys, "set-id", 7, "--protocol", 1, "--port", port)
+    assert code == 2
+    assert said.err == (
+        "bns: 4 ids seem to answer, and none as a servo does: is this the port of the bus, and its rate? "
+        "A line without servos may be noisy, too.\n"
+    )
+
+
 @pytest.mark.parametrize("kind", [AX12, XL430_W250], ids=lambda kind: kind.model)
 def test_check_shows_an_alarm_that_has_not_gone(bus, capsys, kind):
     servos, port = bus(1, 2, kind=kind, return_delay=0, baud_rate=kind.bauds[1_000_000])
@@ -138,11 +169,14 @@ def test_settings_are_written_with_the_torque_off(bus, capsys, monkeypatch, aske
         return write(self, address, data)
 
     monkeypatch.setattr(Servo, "write", noted)
-    call(capsys, *asked, "--protocol", 1, "--port", port)
+    _, said = call(capsys, *asked, "--protocol", 1, "--port", port)
     settings = [torque for address, torque in written if address < AX12.registers["torque_enable"].address]
     assert settings
     assert not any(settings)
     assert servo.get("torque_enable") == 0
+    assert "bns: servo 1: its torque was on and is switched off: its joint is limp now\n" in said.err
+    _, said = call(capsys, "check", "--fix", "--protocol", 1, "--port", port)
+    assert "torque was on" not in said.err
 
 
 def test_a_number_that_was_written_and_not_seen_is_told(bus, capsys, monkeypatch):
@@ -158,6 +192,31 @@ def test_a_number_that_was_written_and_not_seen_is_told(bus, capsys, monkeypatch
     assert (code, servo.get("id")) == (2, 7)
     assert "servo 7 does not answer" in said.err
     assert "The servo may have the id 7 by now, or still 1: switch it off and on, then bns servos scan tells." in said.err
+
+
+@pytest.mark.parametrize(
+    ("baud", "told"),
+    [
+        (1_000_000, "Neither its id nor its rate was to be changed: check its cable and the supply, then try again."),
+        (57_600, "may have 1000000 baud by now, or still 57600: switch it off and on, then bns servos scan --all-bauds tells."),
+    ],
+    ids=["as it is", "another rate"],
+)
+def test_a_servo_that_keeps_its_number_and_is_lost_is_not_said_to_have_one_of_two(bus, capsys, monkeypatch, baud, told):
+    (servo,), port = bus(7)
+    numbered, scan = ServoBus._numbered, ServoBus.scan
+
+    def lost(self, found, new):
+        servo.put("status_return", 0)
+        servo.put("id", 9)
+        return numbered(self, found, new)
+
+    monkeypatch.setattr(ServoBus, "_numbered", lost)
+    monkeypatch.setattr(ServoBus, "scan", lambda *asked: (found._replace(baud=baud) for found in scan(*asked)))
+    code, said = call(capsys, "set-id", 7, "--from", 7, "--protocol", 1, "--port", port)
+    assert code == 2
+    assert said.err.endswith(f"{told}\n")
+    assert "the id 7" not in said.err
 
 
 def test_nobody_to_be_numbered_is_said_to_be_nobody(bus, capsys):

@@ -187,12 +187,16 @@ def test_a_camera_is_set_and_read_back(monkeypatch, tmp_path, clock):
     ("then", "gone"),
     [
         ((False, None), "the camera 0 is gone: it was unplugged"),
+        ((True, None), "the camera 0 is gone: it was unplugged"),
+        (cv2.error("a picture that is none"), "the camera 0 failed (error: a picture that is none). Connect it again"),
         ((True, np.zeros((600, 800, 3), np.uint8)), "the camera 0 gave pictures of 1280 x 720 pixels, and now gives some of 800"),
     ],
 )
-def test_a_camera_that_is_unplugged_or_changes_its_size_shows_nothing_more_and_says_why(monkeypatch, clock, then, gone):
+def test_a_camera_that_is_unplugged_fails_or_changes_its_size_shows_nothing_more_and_says_why(monkeypatch, clock, then, gone):
     class Changing(Webcam):
         def read(self):
+            if changed.is_set() and isinstance(then, Exception):
+                raise then
             return super().read() if not changed.is_set() else then
 
     changed = threading.Event()

@@ -5,6 +5,7 @@ import os
 import resource
 import subprocess
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -163,8 +164,53 @@ def test_a_drive_ends_at_the_next_look_when_the_log_is_full(tmp_path, full):
         full(opened.log)
         with pytest.raises(TrialFileError):
             opened.platform.drive(np.array([[500.0, 500.0, 60_000.0]], np.float32))
-        assert opened.clock.now_s() - began_s < 20.0  # of the minute that was asked for
+        assert opened.clock.now_s() - began_s < 1.5  # of the minute that was asked for; 0.6 s of it are looks before and after
         assert opened.platform.stop().confirmed
+
+
+def test_a_log_learns_within_a_moment_that_its_disk_takes_nothing_more(tmp_path, full):
+    """However little is noted: a robot is driving."""
+    clock = EmulatedClock(np.inf)
+    log = HardwareLog(tmp_path / "journal.jsonl", clock)
+    log.note("one")
+    full(log)
+    clock.sleep(0.2)
+    log.note("two")
+    with pytest.raises(TrialFileError, match="No space left on device"):
+        log.check()
+    with pytest.raises(TrialFileError):
+        log.close()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
+def test_the_exit_code_is_told_where_nothing_can_be_said(tmp_path):
+    """Outputs may lie on the disk that is full."""
+    rig = tmp_path / "rig.yaml"
+    rig.write_text("nothing")
+    with open("/dev/full", "w") as full:  # noqa: PTH123  # of no other use
+        asked = [sys.executable, "-m", "bns", "trial", "--robot", "khepera", "--rig", rig, "--results", tmp_path]
+        assert subprocess.run(asked, stdout=full, stderr=full, check=False, timeout=600).returncode == 2
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
+@pytest.mark.parametrize(
+    ("streams", "kept"), [(("stdout",), 2), (("stderr",), 0), (("stdout", "stderr"), 0)], ids=["report", "notes", "both"]
+)
+@pytest.mark.slow
+def test_a_trial_whose_outputs_cannot_be_written_does_not_say_that_nothing_has_moved(tmp_path, streams, kept):
+    """A note is told after the first drive."""
+    drives = tmp_path / "commands.csv"
+    drives.write_text("trial,left_m_s,right_m_s,duration_s\n1,0.005,0.005,1\n2,0.005,0.005,1\n")
+    asked = [sys.executable, "-m", "bns", "trial", "--robot", "khepera", "--emulated", "--yes", "--speed", "inf"]
+    with open("/dev/full", "w") as full:  # noqa: PTH123  # of no other use
+        outputs = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | dict.fromkeys(streams, full)
+        done = subprocess.run(
+            [*asked, "--results", tmp_path, "--commands", drives], **outputs, text=True, check=False, timeout=600
+        )
+    assert done.returncode == 5
+    assert len(past_evaluations(journal_of(tmp_path))) == kept
+    if "stderr" not in streams:
+        assert "cannot write the output: No space left on device. The robot stands still" in done.stderr
 
 
 def test_what_a_trial_ended_with_is_not_hidden_by_its_tables(tmp_path, monkeypatch, capsys):

@@ -57,6 +57,8 @@ def test_bad_input_is_named(tmp_path, monkeypatch, capsys, arguments, message):
         ({"silent_s": 300}, "silent_s is 300 s; at most 30 s"),
         ({"gives_up_s": 14400000}, "gives_up_s is 14400000 s; at most 604800 s"),
         ({"surface_m": {"x": [-90, 90], "y": [-1, 1]}}, "surface_m is 180 m long; at most 100. Its numbers are in metres"),
+        ({"placed_within_rad": 20}, "line .: placed_within_rad is 20; at most π. It is in radians, not degrees: 20° are 0.35"),
+        ({"placed_within_m": 100}, "line .: placed_within_m is 100; at most 2, the length of surface_m. It is in metres"),
         ({"port": "/dev/nowhere"}, "there is no port /dev/nowhere"),
     ],
 )
@@ -87,6 +89,9 @@ COLOUR = {"kind": "colour", "camera": 0, "calibration": "none.json", "diameter_m
     [
         ("khepera", {"kind": "radar"}, "unknown kind of tracker 'radar'"),
         ("khepera", WII | {"height_m": -1}, "height_m is -1; it must be a number above 0"),
+        ("khepera", WII | {"height_m": 2400}, "wii tracker: height_m is 2400; at most 20. It is in metres, not millimetres"),
+        ("khepera", WII | {"view_rad": 43}, "wii tracker: view_rad is 43; at most 3.14. It is in radians, not degrees"),
+        ("snake", COLOUR | {"diameter_m": 60}, "colour tracker: diameter_m is 60; at most 20. It is in metres"),
         ("khepera", WII | {"x_m": "left"}, "has a setting that is no number"),
         ("khepera", {"kind": "colour"}, "lacks camera, calibration, diameter_m, height_m"),
         ("khepera", COLOUR | {"diameter_m": "abc"}, "diameter_m is 'abc'; it must be a number above 0"),

@@ -3,6 +3,7 @@
 import pytest
 
 from bns.hardware.link.hardware_log import events
+from bns.hardware.wheels.khepera import KheperaIII
 from bns.trial.folder import past_evaluations
 
 from .calls import call, faults, journal_of
@@ -35,6 +36,19 @@ def test_a_restart_soon_after_the_first_drive_began_is_seen(tmp_path, capsys, af
     plan = faults(tmp_path, {"kind": "brown-out", "at_s": began_s + after_s, "for_s": 0.001})
     assert call(*asked, "--results", tmp_path / "second", *plan) == 3
     assert "the robot has restarted during the drive: its counters of the wheels began again at zero" in capsys.readouterr().err
+
+
+def test_counters_that_leap_where_no_restart_brings_them_are_not_called_a_restart(tmp_path, capsys, monkeypatch):
+    drives = tmp_path / "commands.csv"
+    drives.write_text("trial,left_m_s,right_m_s,duration_s\n1,0.06,0.1,1\n")
+    asked = ["trial", "--robot", "khepera", "--emulated", "--yes", "--speed", "inf", "--results", tmp_path, "--commands", drives]
+    answers = iter([(100.0, 100.0)])  # before the drive
+    monkeypatch.setattr(KheperaIII, "encoders_m", lambda _self: next(answers, (4.6e6, -4.6e6)))
+    assert call(*asked) == 3
+    said = capsys.readouterr().err
+    assert "the counters of the robot's wheels leapt by 4600100.0 m during the drive" in said
+    assert "restarted" not in said
+    assert not past_evaluations(journal_of(tmp_path))
 
 
 @pytest.mark.parametrize("kind", ["hang-up", "bus-fault"])

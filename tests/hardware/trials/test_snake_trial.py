@@ -134,7 +134,7 @@ def test_arming_does_not_move_the_robot(rigged, clock):
 @pytest.mark.parametrize(
     ("fault", "message"),
     [
-        (Fault("overload", at_s=3.0, for_s=0.5, servo=4), "servo 4: overload"),
+        (Fault("overload", at_s=3.0, for_s=0.5, servo=4), "servo 4: overload; fix the cause, then switch the servos off and on"),
         (Fault("overheat", at_s=3.0, for_s=5.0, servo=7), "servo 7: overheated"),
         (Fault("silent-servo", at_s=3.0, for_s=1.5, servo=12), "servo 12: .*asked 6 times"),
         (Fault("hang-up", at_s=3.0, for_s=1.0), "the port is gone"),
@@ -231,6 +231,13 @@ def test_the_doctor_asks_the_servos(rigged, clock, tmp_path, wiring):
         ({"ids": [1] * 12}, "give 12 different whole numbers"),
         ({"torque": 2.0}, "torque is 2; it is a fraction"),
         ({"joint_speed_rad_s": 0}, "joint_speed_rad_s is 0; it must be a number above 0"),
+        ({"joint_speed_rad_s": 86}, "joint_speed_rad_s is 86; without load the AX-12 turns at 6.2. It is in radians a second"),
+        ({"stuck_s": 1000}, "stuck_s is 1000; at most 10. It is in seconds, not milliseconds"),
+        ({"stalled_s": 250}, "stalled_s is 250; at most 10"),
+        ({"settle_s": 200}, "settle_s is 200; at most 10"),
+        ({"temperature_c": 338}, "temperature_c is 338; at most 85. It is in degrees Celsius"),
+        ({"load": 95}, "load is 95; at most 1. It is a fraction of the permitted torque"),
+        ({"low_v": 90}, "low_v is 90, and high_v 12.5; low_v must be the lower one"),
         ({"sped": 1}, "unknown setting 'sped'"),
     ],
 )

@@ -1,5 +1,7 @@
 """The Khepera's driver against bytes on a pseudo-terminal."""
 
+import errno
+
 import numpy as np
 import pytest
 
@@ -202,6 +204,14 @@ def test_ports_that_cannot_be_used(tmp_path, clock, bench):
     file.write_text("")
     with pytest.raises(HardwareError, match="cannot be opened"):
         SerialLink(str(file), 115200, clock, journal)
+
+
+def test_a_port_that_one_file_too_many_keeps_closed_is_not_said_to_be_no_port(clock, bench, monkeypatch):
+    rig = bench()
+    rig.link.close()
+    monkeypatch.setattr("serial.serialposix.os.open", lambda *_: (_ for _ in ()).throw(OSError(errno.EMFILE, "too many")))
+    with pytest.raises(HardwareError, match=r"khepera0 cannot be opened: too many files are open already\. .* \(ulimit -n\)\.$"):
+        SerialLink(str(rig.line.path), 115200, clock, HardwareLog(None, clock))
 
 
 def test_a_flat_battery_is_refused():

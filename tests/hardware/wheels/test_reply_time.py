@@ -207,6 +207,7 @@ def test_an_adapter_that_echoes_is_driven_like_any_other(tmp_path, clock, body, 
     [
         ({"first_reply": 1.0}, "unknown setting 'first_reply'. Did you mean 'first_reply_s'"),
         ({"stop_s": -1}, "stop_s is -1; it must be a number of seconds above 0"),
+        ({"stop_s": 5000}, "stop_s is 5000 s; at most 60. It is in seconds, not milliseconds"),
         ({"least_reply_s": 2.0}, "least_reply_s is 2, above its most_reply_s 0.8"),
     ],
 )
