@@ -6,7 +6,7 @@ import pytest
 
 from bns.diagnose.adding import warnings_on
 from bns.diagnose.data.tracks import tracks_of
-from bns.diagnose.effect_caveats import _on_numbers
+from bns.diagnose.effect_caveats import on_numbers
 from bns.diagnose.estimate.cross_validation import judged_errors
 from bns.diagnose.estimate.fit_set import fit_set
 from bns.diagnose.estimate.plausibility import does_nothing, known_together
@@ -74,7 +74,7 @@ def test_such_an_effect_acts_and_its_numbers_are_not_to_be_read_alone(short_sess
     errors = judged_errors(predictor, problem.pose_filter, NOMINAL, [])
     said = list(warnings_on(fit, [(effect_named(COLD), {})], errors))
     assert not any("no visible effect" in line for line in said)
-    assert _on_numbers(effect_named(COLD)).startswith(f"{COLD}: width_m_s and cold_m_s and time_s are only known together.")
+    assert on_numbers(effect_named(COLD)).startswith(f"{COLD}: width_m_s and cold_m_s and time_s are only known together.")
 
 
 def test_an_effect_that_is_not_there_does_nothing(short_session):
