@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bns.diagnose.data.bodies.joints import are_joints
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
 from bns.measurements import BEFORE, COMMANDS, POSE, RUN_UP, SESSION
@@ -27,8 +26,6 @@ def split(table: pd.DataFrame, by: str, seconds: float) -> pd.DataFrame:
     whole keeps its name. DataError where that makes fewer than two trials, or no more than there were.
     """
     missing = [name for name in ("t_s", *COMMANDS) if name not in table.columns]
-    if missing and are_joints(table):
-        raise DataError("A log of joints' set points is not cut into trials: give it a column trial with another value in each.")
     if missing:
         raise DataError(f"To be cut into trials, a log needs {', '.join(missing)}; add entries for them.")
     if "trial" not in table.columns:

@@ -245,3 +245,13 @@ def test_quaternions_of_an_upright_robot_are_headings(up):
     np.testing.assert_allclose(applied(table, mapping)["heading_rad"], heading, atol=1e-12)
     lost = applied(table.assign(qw=np.nan), mapping)
     assert lost["heading_rad"].isna().all()
+
+
+def test_a_log_of_joints_is_not_cut_and_says_so(tmp_path):
+    """Not that it lacks the commands of wheels."""
+    table = pd.DataFrame({"t_s": [0.0, 1.0], "elbow_set_rad": [0.1, 0.2], "tip_x_m": [0.0, 0.1], "tip_y_m": [0.0, 0.1]})
+    table.to_csv(tmp_path / "arm.csv", index=False)
+    columns = "".join(f"  {name}: {{from: {name}}}\n" for name in table)
+    (tmp_path / "arm.csv.import.yaml").write_text(f"columns:\n{columns}trials: {{lasting_s: 8}}\n")
+    with pytest.raises(DataError, match=r"arm\.csv.*set points is not cut into trials\. Give it a column trial"):
+        measured_table(tmp_path / "arm.csv")
