@@ -22,6 +22,8 @@ if TYPE_CHECKING:  # half a second to load, and a run needs no table
     import pandas as pd
 
 COMMANDS = ("left_m_s", "right_m_s")
+SET = "_set_rad"
+"""How the columns of joints' set points end."""
 POSE = ("x_m", "y_m", "heading_rad")
 SESSION = "session_s"
 """Time since the session began, where it was logged."""

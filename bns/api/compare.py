@@ -20,9 +20,11 @@ from bns.api.model import Given, Model
 from bns.diagnose.adding import known_to, model_yaml
 from bns.diagnose.comparison import Comparison
 from bns.diagnose.comparison import compare as held_against
+from bns.diagnose.data.bodies.joints import JointTracks
 from bns.diagnose.predict.base import Predictor
 from bns.diagnose.predict.jointed import JointedPredictor
 from bns.diagnose.predict.networks import NetworkPredictor
+from bns.diagnose.predict.run_ups import joint_stretches
 from bns.diagnose.report.network_text import network_errors_text
 from bns.diagnose.report.text import ahead, comparison_text
 from bns.diagnose.residuals.network_errors import NetworkErrors, why_wrong
@@ -30,6 +32,7 @@ from bns.diagnose.settings import DEFAULTS
 from bns.diagnose.settings.chosen import in_force
 from bns.errors import DataError, ModelError
 from bns.physics import model as physics
+from bns.physics.jointed.model import JointedModel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -201,6 +204,10 @@ def _of_its_own(first: Predictor, other: Prepared) -> Predictor | None:
             f"{other.model.name} is seen at the sites {', '.join(own.sites)}, and the model that it is compared beside at "
             f"{', '.join(first.sites)}. Give both models the same sites in the same order."
         )
+    if isinstance(other.log.measured.tracks, JointTracks):
+        assert isinstance(other.model, JointedModel)
+        same = joint_stretches(other.log.measured.tracks, other.model.mechanism, first.all_stretches)
+        own = JointedPredictor(same, other.model, own.near)
     return own.on_stretches_of(first)
 
 

@@ -13,7 +13,7 @@ from bns.api.measurements import Log, Measurements, as_measurements
 from bns.api.model import Given, Model, as_model
 from bns.diagnose.adding import known_to
 from bns.diagnose.data.bodies.cycles import CycleTracks, marker_noise_m
-from bns.diagnose.data.bodies.joints import SET, JointTracks, check_names, check_scales
+from bns.diagnose.data.bodies.joints import JointTracks, check_names, check_scales
 from bns.diagnose.data.bodies.stretches import stretches_of_cycles
 from bns.diagnose.data.load import Measured, naming
 from bns.diagnose.data.tracks import Tracks
@@ -24,6 +24,7 @@ from bns.diagnose.predict.run_ups import joint_stretches
 from bns.diagnose.predict.saved_networks import network_predictor, networks_file
 from bns.diagnose.predict.wheels import predictor_for_search
 from bns.errors import DataError, ModelError, in_both
+from bns.measurements import SET
 from bns.physics import model as physics
 from bns.physics.jointed.mechanism import machine
 from bns.physics.jointed.model import JointedModel

@@ -73,9 +73,6 @@ def import_log(files: Sequence[Path], mapping: Mapping[str, Any] | None = None) 
     with rules.at("also" if named else "columns"):
         if missing:
             raise DataError(f"nothing is taken from {missing[0]}; add it under also:, or leave the file out.")
-    if "trials" in rules and are_joints(table):
-        with naming(first), rules.at("trials"):
-            raise DataError("a log of joints' set points is not cut into trials. Give it a column trial, another value in each.")
     with naming(first), rules.at("columns"):
         try:
             out = applied(table, rules, first.parent, read_table)

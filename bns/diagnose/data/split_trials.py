@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
-from bns.measurements import BEFORE, COMMANDS, POSE, RUN_UP, SESSION
+from bns.measurements import BEFORE, COMMANDS, POSE, RUN_UP, SESSION, SET
 
 STILL_M_S = DEFAULTS.data.still_m_s
 KEPT_S = DEFAULTS.data.kept_standing_s
@@ -26,6 +26,8 @@ def split(table: pd.DataFrame, by: str, seconds: float) -> pd.DataFrame:
     whole keeps its name. DataError where that makes fewer than two trials, or no more than there were.
     """
     missing = [name for name in ("t_s", *COMMANDS) if name not in table.columns]
+    if missing and any(str(name).endswith(SET) for name in table.columns):
+        raise DataError("A log of joints' set points is not cut into trials: give it a column trial, another value in each.")
     if missing:
         raise DataError(f"To be cut into trials, a log needs {', '.join(missing)}; add entries for them.")
     if "trial" not in table.columns:

@@ -99,8 +99,13 @@ class JointedPredictor:
         self._foresee(chance)
         self.screening: Predictor | None = self._light(chance, _LIGHT)
 
+    @property
+    def all_stretches(self) -> StretchTracks:
+        """Those that count, and those that nobody can foresee."""
+        return self._all.tracks
+
     def on_stretches_of(self, other: JointedPredictor) -> JointedPredictor:
-        """This body on the stretches that another one of the same measurements counts."""
+        """This body, made of `all_stretches` of another one, on those that the other one counts."""
         if np.array_equal(self._kept, other._kept):
             return self
         new = object.__new__(JointedPredictor)

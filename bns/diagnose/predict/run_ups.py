@@ -25,12 +25,13 @@ _ASKED = DEFAULTS.predict.run_up_stretches
 _NEAR = DEFAULTS.predict.began_near
 
 
-def joint_stretches(tracks: JointTracks, mechanism: Mechanism) -> StretchTracks:
+def joint_stretches(tracks: JointTracks, mechanism: Mechanism, of: StretchTracks | None = None) -> StretchTracks:
     """Trials cut into stretches, with a run-up as long as the body needs.
 
     The joints of a body that is quick and stiff are where they are told to be after two seconds, wherever they began; those of a
     slow or a soft one are not. The run-up is doubled as long as that halves what shows of its begin. Of a trial that begins in
-    motion, stretches without a whole run-up are left out, unless there are no others.
+    motion, stretches without a whole run-up are left out, unless there are no others. ``of``: those that another body was judged
+    on, and no others, whatever run-up this one needs.
     """
     body = machine(mechanism)
     began = _began(tracks, body)
@@ -44,11 +45,20 @@ def joint_stretches(tracks: JointTracks, mechanism: Mechanism) -> StretchTracks:
         if shows_m <= _SHOWS_M:
             break
         run_up_s, before_m = 2 * run_up_s, shows_m
+    if of is not None:
+        wanted = set(_begun(of))
+        return _with_run_up(out.of(np.flatnonzero([begun in wanted for begun in _begun(out)])), run_up_s)
     rested = {name for name, one in zip(tracks.names, began, strict=True) if one.at_rest}
-    of = np.array(out.names)[out.trial[out.begins]]
+    names = np.array(out.names)[out.trial[out.begins]]
     whole = np.array([t.from_s - t.t_s[0] >= run_up_s - 1e-9 for t in out.told if isinstance(t, SetPoints)])
-    sure = np.flatnonzero(whole | np.isin(of, list(rested)))
+    sure = np.flatnonzero(whole | np.isin(names, list(rested)))
     return _with_run_up(out.of(sure) if len(sure) else out, run_up_s)
+
+
+def _begun(stretches: StretchTracks) -> list[tuple[str, float]]:
+    """The trial of each stretch, and when in it the stretch begins, s."""
+    trials = [stretches.names[trial] for trial in stretches.trial[stretches.begins]]
+    return [(name, told.from_s) for name, told in zip(trials, stretches.told, strict=True) if isinstance(told, SetPoints)]
 
 
 def _with_run_up(stretches: StretchTracks, run_up_s: float) -> StretchTracks:

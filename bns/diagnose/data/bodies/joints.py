@@ -16,12 +16,12 @@ from bns.diagnose.data.checks import Finding, check_columns, forward_in_time, le
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
+from bns.measurements import SET
 
 _SLOWEST_S = DEFAULTS.data.stretch_s
 _BEYOND, _TURNS_RAD = DEFAULTS.data.set_point_beyond, DEFAULTS.data.set_point_turns_rad
 _MOSTLY = DEFAULTS.data.set_points_in_other_units
 _REACHES, _STILL = DEFAULTS.data.sites_reach, DEFAULTS.data.sites_still
-SET = "_set_rad"
 X, Y = "_x_m", "_y_m"
 
 

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bns.diagnose.data.bodies.cycles import CycleTracks
-from bns.diagnose.data.bodies.joints import SET, JointTracks
+from bns.diagnose.data.bodies.joints import JointTracks
 from bns.diagnose.data.tracks import Array, Tracks
 from bns.diagnose.settings import DEFAULTS
 from bns.errors import DataError
+from bns.measurements import SET
 from bns.physics.jointed.drives import RUN_UP_S, Drive, at_times, through_postures
 from bns.physics.jointed.mechanism import Mechanism
 from bns.robots.snake.gait import COMMANDS_A_CYCLE, joint_angles
