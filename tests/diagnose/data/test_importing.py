@@ -253,5 +253,5 @@ def test_a_log_of_joints_is_not_cut_and_says_so(tmp_path):
     table.to_csv(tmp_path / "arm.csv", index=False)
     columns = "".join(f"  {name}: {{from: {name}}}\n" for name in table)
     (tmp_path / "arm.csv.import.yaml").write_text(f"columns:\n{columns}trials: {{lasting_s: 8}}\n")
-    with pytest.raises(DataError, match=r"arm\.csv.*set points is not cut into trials\. Give it a column trial"):
-        measured_table(tmp_path / "arm.csv")
+    with pytest.raises(DataError, match=r"arm\.csv.*set points is not cut into trials: give it a column trial"):
+        load_measured(tmp_path / "arm.csv")
