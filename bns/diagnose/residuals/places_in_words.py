@@ -20,6 +20,9 @@ def _along(term: Formula, name: str, grid: Array, what: str) -> str:
     """A share of all velocities along a signal, where it is lowest and highest."""
     share = curve_of(term, name, grid)
     low, high = int(share.argmin()), int(share.argmax())
+    most, least = (low, high) if abs(share[low]) > abs(share[high]) else (high, low)
+    if f"{abs(share[least]):.2%}" == f"{0.0:.2%}":  # there the effects say all
+        return f"{slower(-share[most])} at {seconds(grid[most])} {what} than at {seconds(grid[least])}"
     return f"{slower(-share[low])} at {seconds(grid[low])} {what}, {slower(-share[high])} at {seconds(grid[high])}"
 
 
