@@ -177,6 +177,8 @@ def test_a_sweep_in_a_model_file_that_is_missing_or_none_writes_nothing(tmp_path
         (["sweep", "x.yaml", "--jobs", "0"], r"whole number of 1 or more"),
         (["run", "--pop", "20"], r"there is no option --pop\. Did you mean --population-size\?"),
         (["run", "circle"], r"^bns: circle: unexpected argument\. All options: bns run --help\n$"),
+        (["status", "old"], r"^bns: old: unexpected argument\. Did you mean --results old\? All options: bns status --help\n$"),
+        (["diagnose", "log.csv", "--model", "khepera", "--wheelbase", "0,0884"], r"'0,0884' is not a number; .* such as 0\.0884"),
         (["swep", "x.yaml"], r"^bns: there is no command swep\. Did you mean sweep\? .*; its options: bns sweep --help\n$"),
         (["--jsn", "status"], r"there is no option --jsn"),
         (["diagnose", "log.csv", "--modl", "khepera"], r"Did you mean --model\? All options: bns diagnose --help\n$"),

@@ -262,6 +262,8 @@ def test_after_a_clear_verdict_only_the_accepted_one_is_contested():
     assert ahead in proposal_text(elsewhere, "next one.csv", said)
     undecided = replace(proposal, model_pairs=(replace(proposal.model_pairs[0], already_decided=False),))
     assert "No experiment is needed" not in proposal_text(undecided)
+    assert text.startswith("verdict so far: effects; explanations compared: turn-slip;")
+    assert proposal_text(undecided).startswith("verdict so far: effects; explanations to tell apart: turn-slip;")
     assert model_pairs_of(d, competing_models) == tuple((0, i) for i in range(1, len(competing_models)))
 
 

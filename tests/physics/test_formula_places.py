@@ -84,3 +84,10 @@ def test_rounding_and_values():
     assert value_of("k * round(u / 0.5)", {"k": 2.0, "u": np.array([0.2, 0.3, 1.1])}).tolist() == [0.0, 2.0, 4.0]
     with pytest.raises(ModelError, match="round takes 1"):
         formula_effect("own", "k * round(v, 2)", "v")
+
+
+def test_a_variable_in_the_wrong_case_is_no_number_to_fit():
+    """k * v * abs(W) has two numbers that only their product is known of."""
+    with pytest.raises(ModelError, match=r"formula own: did you mean w by W\? Give a number to fit another letter"):
+        formula_effect("own", "k * v * abs(W)", "v")
+    assert [p.name for p in formula_effect("own", "W * v", "v", numbers=("W",)).parameters] == ["W"]

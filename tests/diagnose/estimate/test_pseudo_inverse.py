@@ -74,6 +74,7 @@ def test_such_an_effect_acts_and_its_numbers_are_not_to_be_read_alone(short_sess
     errors = judged_errors(predictor, problem.pose_filter, NOMINAL, [])
     said = list(warnings_on(fit, [(effect_named(COLD), {})], errors))
     assert not any("no visible effect" in line for line in said)
+    assert on_numbers(effect_named(COLD)) in said
     assert on_numbers(effect_named(COLD)).startswith(f"{COLD}: width_m_s and cold_m_s and time_s are only known together.")
 
 
