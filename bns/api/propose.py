@@ -201,7 +201,7 @@ def checked_minutes(minutes: float) -> None:
 def checked_output(path: Path, what: str, ending: str) -> Path:
     """The path; DataError unless a file of that ending can be written there."""
     if path.suffix != ending:
-        raise DataError(f"{what} cannot be written to {path}; the name must end in {ending}.")
+        raise DataError(f"{what} cannot be written to {path}; give a name that ends in {ending}.")
     if found := obstacle(path):
         raise DataError(f"{what} cannot be written to {path}: {found}; choose another place.")
     return path

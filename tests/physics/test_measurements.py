@@ -63,5 +63,5 @@ def test_a_place_that_cannot_be_written_is_named_and_no_part_of_a_table_stays(tm
         write_measurements(table, path)
     assert (said.value.filename, said.value.strerror, said.value.errno) == (str(path), "Read-only file system", errno.EROFS)
     assert main(["import", str(tmp_path / "log.csv"), "-o", str(path)]) == 2
-    assert f"cannot use {path}: Read-only file system. Name another place" in capsys.readouterr().err
+    assert f"cannot use {path}: Read-only file system. Choose another place" in capsys.readouterr().err
     assert sorted(p.name for p in tmp_path.iterdir() if p.name.startswith((".m", "m."))) == []

@@ -41,7 +41,7 @@ def accepted_with(accepted: tuple[str, ...], step: SelectionStep, fit: Fit) -> t
     """What is accepted after a step that ended in ``fit``: an effect that it moved in the chain goes by its name there."""
     there = {active.effect.name: active.effect for active in fit.model.effects}
     kept = [name for name in accepted if name != step.instead_of]
-    return (*(n if n in there else next(e.name for e in there.values() if n in e.parts) for n in kept), step.selected)
+    return (*(n if n in there else next((e.name for e in there.values() if n in e.parts), n) for n in kept), step.selected)
 
 
 class Forwards:

@@ -165,7 +165,7 @@ def test_a_browser_shows_it_without_an_error_and_the_slider_moves(page_of, tmp_p
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
-    [(["-o", "a.pdf"], "ends in .html"), (["-o", "gone/a.html"], "a folder that is there"), (["--minutes", "-1"], "above 0")],
+    [(["-o", "a.pdf"], "ends in .html"), (["-o", "gone/a.html"], "there is no folder"), (["--minutes", "-1"], "above 0")],
 )
 def test_what_cannot_be_asked_is_refused_and_nothing_written(tmp_path, monkeypatch, arguments, message, capsys):
     monkeypatch.chdir(tmp_path)
